@@ -1,4 +1,4 @@
-"""What takes long to make, kept on disk under a hash of everything that made it."""
+"""Expensive results kept on disk under a hash of everything they were made from."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from spindle_fem.registry import source_from_outside
 
 LOGGER = logging.getLogger(__name__)
 CACHE_VARIABLE = "SPINDLE_FEM_CACHE"
-# What reading an .npz file raises that is cut, changed, or of something else.
+# Exceptions on reading an .npz file that is truncated, changed, or of another type.
 DAMAGED = (OSError, ValueError, KeyError, EOFError, TypeError, MemoryError, OverflowError, RuntimeError)
 DAMAGED = (*DAMAGED, zipfile.BadZipFile, zlib.error)
 _PACKAGE = Path(__file__).parent
@@ -37,7 +37,7 @@ _IS_REGISTRY = "registry(__name__)"
 
 
 def cache_directory() -> Path:
-    """Where meshes and models are kept: $SPINDLE_FEM_CACHE, or the platform's cache folder."""
+    """Folder for meshes and models: $SPINDLE_FEM_CACHE, or the platform's cache folder."""
     chosen = os.environ.get(CACHE_VARIABLE)
     if chosen:
         return Path(chosen)
@@ -98,10 +98,10 @@ def _with_imports(modules: Sequence[str]) -> dict[str, Path]:
         found[name] = path
         text = path.read_text(encoding="utf-8")
         if path.name == "__init__.py" and _IS_REGISTRY in text:
-            # Its files are imported by name when they are asked for.
+            # Its files are imported by name on first use.
             waiting += [f"{name}.{file.stem}" for file in path.parent.glob("*.py") if file != path]
         for package, listed in _IMPORT.findall(text):
-            # What is imported from a package may be a module of it or a name inside it.
+            # A name imported from a package may be a module of it or a name inside it.
             members = (f"{package}.{member}" for member in re.findall(r"\w+", listed))
             waiting += [item for item in (package, *members) if _module_file(item) is not None]
     return found

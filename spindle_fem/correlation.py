@@ -21,7 +21,7 @@ class Correlation:
 
     Called with the quantities of the formula as array_like of one shape or
     shapes that broadcast, it returns an array. Outside its range it raises :class:`OutOfValidityError`,
-    unless told ``extrapolate=True``; whoever says so must tell the user.
+    unless ``extrapolate=True`` is given; callers that give it must warn the user.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Correlation:
         return self.function(*arrays)
 
     def faults(self, **quantities: ArrayLike) -> tuple[str, ...]:
-        """Sentence parts that say which of the quantities given leave their range."""
+        """Parts of a sentence on which of the given quantities leave their range."""
         limited = self._limited(quantities)
         texts = (range_fault(name, value, *self.ranges[name]) for name, value in limited.items())
         return tuple(text for text in texts if text)

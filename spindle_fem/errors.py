@@ -37,7 +37,7 @@ class SpindleFemError(Exception):
         return f"{text} {self.how_to_fix}".rstrip()
 
     def as_plain(self) -> dict[str, str]:
-        """For JSON."""
+        """Plain values for JSON."""
         return {"where": self.where, "what": self.what, "how_to_fix": self.how_to_fix}
 
 
@@ -94,11 +94,11 @@ class MeshQualityError(SpindleFemError):
 
 
 class OutOfValidityError(SpindleFemError):
-    """A correlation was asked outside the range of its source."""
+    """A correlation was evaluated outside the range of its source."""
 
 
 class NoEquilibriumError(SpindleFemError):
-    """A bearing has no quasi-static equilibrium at the asked state."""
+    """A bearing has no quasi-static equilibrium at the requested state."""
 
 
 class NoSteadyStateError(SpindleFemError):
@@ -141,7 +141,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def of_system(error: OSError) -> SpindleFemError | OSError:
-    """What the operating system refused, with where and how to fix; other errors as they are.
+    """Convert an error of the operating system to one with where and how to fix; others stay unchanged.
 
     >>> str(of_system(OSError(errno.EROFS, "Read-only file system", "out/new.toml")))
     'out/new.toml: cannot be used (Read-only file system). Give another path.'

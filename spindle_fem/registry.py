@@ -3,7 +3,7 @@
 The folder is the list: its file names are the names that a definition may
 give and the first line of each file says what it is, both known without
 importing anything, so that reading a definition loads no numerical library. A file is
-imported when its thing is first asked for. Code outside the package adds its
+imported when its thing is first used. Code outside the package adds its
 own with :meth:`Registry.add` or :meth:`Registry.register`, and an installed
 package by an entry point of the group ``spindle_fem.heat_models`` (the folder's
 name). What a program added goes with every job to other processes (``ADDED``).
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 Thing = TypeVar("Thing")
-# What a program added, by folder and name.
+# Things added by a program, by folder and name.
 ADDED: dict[str, dict[str, Any]] = {}
 
 
@@ -100,7 +100,7 @@ class Registry(Mapping[str, Any]):
         return self.add(module.rpartition(".")[2] if inside else thing.__name__, thing)
 
     def summary(self, name: str) -> str:
-        """What a thing is, in one line."""
+        """Description of a thing in one line."""
         files = _files(self.package)
         text = _docstring(files[name]) if name in files else (self[name].__doc__ or "")
         return text.strip().partition("\n")[0]
@@ -127,7 +127,7 @@ def entry_points(group: str) -> Mapping[str, EntryPoint]:
 
 
 def load_entry_point(entry: EntryPoint) -> Any:
-    """What an installed package announces.
+    """Load the object that an installed package announces.
 
     Raises
     ------
@@ -146,9 +146,9 @@ def load_entry_point(entry: EntryPoint) -> Any:
 
 
 def source_from_outside(package: str) -> str:
-    """Hash of what stands behind the things of a folder that are not in it; empty where there are none.
+    """Hash of the sources of a folder's things that lie outside it; empty if there are none.
 
-    Of the files that define them; of what is made of the package's own classes, what it holds.
+    Hashes the files that define them; for instances of the package's own classes, their content.
     """
     group = package.rpartition(".")[2]
     files = [find_spec(entry.module) for entry in entry_points(group).values()]

@@ -34,7 +34,7 @@ _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s
 _FACTOR = r"(?:%|Δ?°[^\W\d]*|[^\W\d]+)(?:(?:\*\*|\^)-?\d|⁻?[¹²³⁴])?"
 _CHAIN = rf"{_FACTOR}(?:\s*[*/·]\s*{_FACTOR}|\s+{_FACTOR})*"
 _UNIT = re.compile(rf"(?:1\s*/\s*)?(?:{_CHAIN}|\({_CHAIN}\))(?:\s*[*/·]\s*(?:{_FACTOR}|\({_CHAIN}\)))*")
-# What definitions are usually written in, and SI in one of it, to pint's last digit (a test compares
+# Factors from the usual units of definitions to SI, to pint's last digit (a test compares
 # them): pint takes half a second to load, a quarter of what ``check`` takes, and is left to other units.
 _USUAL = {
     ("mm", "m"): 1e-3,
@@ -234,7 +234,7 @@ def _allowed_unit(unit: str, kind: str) -> str:
 
 
 def quantity_example(unit: str, kind: str = "quantity") -> str:
-    """How a quantity of a unit is written in a definition file.
+    """Example of a quantity of a unit in a definition file.
 
     >>> quantity_example("m")
     '"19 mm"'

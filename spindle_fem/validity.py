@@ -38,7 +38,7 @@ def require_range(where: str, *, how_to_fix: str = "", **quantities: tuple[Array
     Parameters
     ----------
     where : str
-        Name of the correlation or function that was asked.
+        Name of the correlation or function that was called.
     how_to_fix : str
         What to do instead; the allowed range is always named in the message.
     **quantities : tuple of (array_like, float, float)
@@ -62,7 +62,7 @@ def require_range(where: str, *, how_to_fix: str = "", **quantities: tuple[Array
 
 
 def range_fault(name: str, value: ArrayLike, lowest: float, highest: float) -> str:
-    """Sentence part that says which value leaves its range; empty when none does.
+    """Part of a sentence on which value leaves its range; empty when none does.
 
     For code that warns instead of refusing.
 
@@ -95,7 +95,7 @@ def range_text(lowest: float, highest: float) -> str:
     return f"above 0, at most {highest:.6g}" if above_zero else f"{lowest:.6g} to {highest:.6g}"
 
 
-# What makes a machine behave otherwise than computed, then what harms it; other warnings follow.
+# Warnings that change the result, then those of harm to the machine; other warnings follow.
 CHANGES_RESULT = (
     "no_equilibrium",
     "thermal_preload_omitted",
@@ -128,7 +128,7 @@ def by_consequence(warnings: Iterable[CodedWarning]) -> tuple[CodedWarning, ...]
 
 
 def fold_warnings(warnings: Iterable[CodedWarning], names: Collection[str]) -> tuple[CodedWarning, ...]:
-    """Each warning once; what several named things say alike is said by the first for all.
+    """Each warning once; a warning common to several things is given by the first for all.
 
     Parameters
     ----------

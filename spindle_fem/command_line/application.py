@@ -38,7 +38,7 @@ ORDER = (
 
 
 class _Commands(TyperGroup):
-    """The commands; ``diagnose --plan`` and ``diagnose --jobs`` ask other things than a diagnosis alone."""
+    """The commands; ``diagnose --plan`` and ``diagnose --jobs`` are commands of their own."""
 
     def list_commands(self, ctx: typer.Context) -> list[str]:
         """Names in the order of the help; those without a place in it last."""
@@ -52,7 +52,7 @@ class _Commands(TyperGroup):
         return super().parse_args(ctx, common + [item for item in args if item not in COMMON_FLAGS])
 
     def resolve_command(self, ctx: typer.Context, args: list[str]) -> tuple[str | None, Any, list[str]]:
-        """Which command arguments are for, and those that are left."""
+        """Command that the arguments are for, and the remaining arguments."""
         if args[0] == "diagnose" and PLAN_FLAG in args:
             args = ["plan", *(item for item in args[1:] if item != PLAN_FLAG)]
         elif args[0] == "diagnose" and any(item.partition("=")[0] in WORKER_FLAGS for item in args):
@@ -110,7 +110,7 @@ def _options(
 
 
 class State:
-    """What was asked of every command."""
+    """Options given before every command."""
 
     debug = False
     quiet = False

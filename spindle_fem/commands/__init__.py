@@ -1,1 +1,1 @@
-"""One function a command: a study, its files and its report."""
+"""One function per command: a study, its files and its report."""

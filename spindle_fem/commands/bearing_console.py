@@ -1,4 +1,4 @@
-"""What ``spindle-fem bearing`` prints: a row for each bearing, heat by term, each ball or roller."""
+"""Terminal output of ``spindle-fem bearing``: a row per bearing, heat by term, each ball or roller."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ELEMENT = {
     "film_central_um": ("film µm", 3),
     "lambda": ("Λ", 1),
 }
-# Loads this much apart tell balls from one another.
+# Relative difference of loads from which balls count as different.
 _ALIKE = 1.0e-6
 
 
@@ -34,7 +34,7 @@ def print_bearing(content: Mapping[str, Any], *, every: bool = False) -> None:
     content : mapping
         As ``bearing_report`` returns it.
     every : bool
-        Show balls and rollers that are alike too.
+        Show balls and rollers that are equal too.
     """
     console = open_console()
     bearings = content.get("bearings") or [{"name": "bearing", **content}]
@@ -116,7 +116,7 @@ def _shown(value: float | None, digits: int) -> str:
 
 
 def _span(bearing: Mapping[str, Any], keys: Sequence[str], digits: int, only: Any = None) -> str:
-    """From and to of a quantity of balls or rollers, or the one of them that counts."""
+    """Range of a quantity over balls or rollers, or the value of the one that counts."""
     elements = elements_of(bearing)
     values = [element[key] for element in elements for key in keys if element.get(key) is not None]
     if not values:

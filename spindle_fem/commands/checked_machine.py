@@ -1,4 +1,4 @@
-"""What commands are given: recordings, and machines with the faults of tables, geometry, effects at once."""
+"""Load the input of commands: recordings, and machines with all faults of tables, geometry and effects."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
         named = {part.material for part in spec.part}
         for kind in spec.bearing_types.values():
             named |= {kind.ring_material, kind.element_material}
-        # Of faulty materials, which are told already, no set is assembled.
+        # No set is assembled of faulty materials, which are already reported.
         for group in spec.bearing_set if named <= spec.materials.keys() else ():
             assembled_set(spec, group)
 
     def has_possible_effects(spec: MachineSpec) -> None:
         if not spec.effects:
             return
-        # The catalogue and what it stands on take a second to load.
+        # The catalogue and its imports take a second to load.
         from spindle_fem.model.reduced.defined_effects import check_effects, require_known_effects
 
         examination = examine_machine(machine, overrides)

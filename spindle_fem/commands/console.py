@@ -1,4 +1,4 @@
-"""What the terminal shows: tables of results, the stage or the number of designs done."""
+"""Terminal output: tables of results, the stage or the number of designs done."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ MOST_LINES = 12
 
 
 def open_console() -> Console:
-    """The terminal's width, or a wide page where the output goes to a file or a pipe.
+    """Console as wide as the terminal, or 120 columns if the output goes to a file or a pipe.
 
-    Brackets stay as they are: texts hold names of tables and of the user's own.
+    Markup is off: names of tables and the user's own texts may contain brackets.
     """
     console = Console(quiet=Verbosity.quiet, markup=False)
     return console if console.is_terminal else Console(width=120, quiet=Verbosity.quiet, markup=False)
 
 
 def _print_marked(console: Console, mark: str, text: str, style: str) -> None:
-    """A line that begins with a word in a style of its own."""
+    """Print a line whose first word has a style of its own."""
     console.print(Text.assemble((mark, style), text))
 
 
 def _print_warnings(console: Console, content: dict[str, Any]) -> None:
-    """What was completed by rule, and what there is to be warned of."""
+    """Print assumptions completed by rule, and warnings."""
     for row in content.get("assumed", ()):
         _print_marked(console, "assumed", f" {row['name']}: {row['detail']}", "bold")
     for warning in content["warnings"]:
@@ -142,7 +142,7 @@ def print_pairs(title: str, content: dict[str, Any]) -> None:
 
 
 def print_export(content: dict[str, Any]) -> None:
-    """What an exported model takes and gives."""
+    """Inputs and outputs of an exported model."""
     console = open_console()
     console.print(
         f"wrote {', '.join(content['files'])}: {content['states']} states, {content['scheme']} steps"
@@ -264,7 +264,7 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
 
 
 def print_plan(content: dict[str, Any], folder: Path) -> None:
-    """What a planned test tells, the best further sensors and tests."""
+    """Findings of a plan: distinguishable effects, the best further sensors and tests."""
     console = open_console()
     for sentence in content["summary"]:
         console.print(sentence)
@@ -309,7 +309,7 @@ def print_diagnoses(content: dict[str, Any], folder: Path) -> None:
 
 
 def print_sweep(content: dict[str, Any], folder: Path) -> None:
-    """How many designs were solved, which is best, and where the table is."""
+    """Number of designs solved, the best one, and the path of the table."""
     console = open_console()
     for key, value in content.items():
         if isinstance(value, (str, int, float)) and key != "schema":
@@ -443,7 +443,7 @@ def designs_done(show: bool, total: int) -> Iterator[Callable[[int], None]]:
 
 
 def print_draft(content: dict[str, Any], folder: Path) -> None:
-    """What each column was taken for, how the files were read, and what is unsure."""
+    """Guessed meaning of each column, how the files were read, and doubts."""
     console = open_console()
     table = headed_table("Channels", "column", "role", "stands for", "unit")
     for channel in content["channels"]:

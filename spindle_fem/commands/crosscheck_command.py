@@ -23,7 +23,7 @@ def crosscheck_machine(
     progress: Callable[[str], None] | None = None,
     keep: Callable[[Crosscheck], None] = lambda found: None,
 ) -> dict[str, Any]:
-    """Build the paper's network of a machine, solve it beside the elements, and say why they differ.
+    """Build the paper's network of a machine, solve it and the FEM, and explain their differences.
 
     Writes ``crosscheck.json``, ``figures/*.png``, ``report.html``,
     ``reduced_network.toml``, ``state_space.npz``, ``state_space.json`` and

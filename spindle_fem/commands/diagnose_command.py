@@ -35,8 +35,8 @@ STATE_COLUMNS = ("start", "end", "effect", "component", "value", "unit")
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
-    """What :func:`diagnose` is asked."""
+class _Request:
+    """Arguments of :func:`diagnose`."""
 
     machine: str | Path
     recordings: Iterable[str | Path | Recording]
@@ -91,8 +91,8 @@ def diagnose(
     ------
     SpindleFemError
     """
-    asked = _Asked(machine, recordings, folder, calibrate, overrides, heldout, full_model, progress)
-    return _diagnose(asked, report=True)
+    request = _Request(machine, recordings, folder, calibrate, overrides, heldout, full_model, progress)
+    return _diagnose(request, report=True)
 
 
 def diagnose_without_report(
@@ -102,35 +102,35 @@ def diagnose_without_report(
     *others: Any,
     **choices: Any,
 ) -> dict[str, Any]:
-    """As :func:`diagnose`, which has the same parameters, without ``diagnosis.nc``, figures and report."""
-    return _diagnose(_Asked(machine, recordings, folder, *others, **choices), report=False)
+    """Run :func:`diagnose`, with the same parameters, without ``diagnosis.nc``, figures and report."""
+    return _diagnose(_Request(machine, recordings, folder, *others, **choices), report=False)
 
 
-def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
+def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
     started = time.perf_counter()
-    require_choice(asked.full_model)
-    overrides = tuple(asked.overrides)
-    tell = asked.progress or LOGGER.info
+    require_choice(request.full_model)
+    overrides = tuple(request.overrides)
+    tell = request.progress or LOGGER.info
     tell("reading")
-    read = [recording_of(item, asked.machine, overrides) for item in asked.recordings]
-    earlier = [recording_of(item, asked.machine, overrides) for item in asked.calibrate]
-    opened = open_machine(asked.machine, overrides, read, earlier, heldout=asked.heldout, progress=tell)
+    read = [recording_of(item, request.machine, overrides) for item in request.recordings]
+    earlier = [recording_of(item, request.machine, overrides) for item in request.calibrate]
+    opened = open_machine(request.machine, overrides, read, earlier, heldout=request.heldout, progress=tell)
     opened = with_growth(refined(opened))
-    with output_folder(asked.folder) as place:
+    with output_folder(request.folder) as place:
         drawn = None
         reason = says_too_little(opened)
         # written once there is something to say: an interrupted one leaves the machine of an earlier one
-        definition = resolved_text(asked.machine, overrides)
+        definition = resolved_text(request.machine, overrides)
         if reason:
             replace_text(place / "machine.toml", definition)
             content = unexplained_content(opened, reason)
             content["fit"]["full_model"] = nothing_run(
-                OFF if asked.full_model == AUTO else asked.full_model, "Nothing was fitted."
+                OFF if request.full_model == AUTO else request.full_model, "Nothing was fitted."
             )
         else:
             workers = Workers(min(thread_count(), MOST_WORKERS))
             workers.wake()
-            diagnosis = diagnose_recordings(opened, heldout=asked.heldout, progress=tell, workers=workers)
+            diagnosis = diagnose_recordings(opened, heldout=request.heldout, progress=tell, workers=workers)
             tell("writing")
             replace_text(place / "machine.toml", definition)
             proposed = workers.ahead(partial(next_measurement, diagnosis))
@@ -140,7 +140,7 @@ def _diagnose(asked: _Asked, *, report: bool) -> dict[str, Any]:
             content["fit"]["full_model"] = full_model_errors(
                 diagnosis,
                 opened,
-                mesh=asked.full_model,
+                mesh=request.full_model,
                 keep=lambda name, predicted: _write_predictions(
                     diagnosis, place, f"{name}_full_model", predicted
                 ),
@@ -191,7 +191,7 @@ def _write(diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, repor
 
 
 def _write_predictions(diagnosis: Diagnosis, place: Path, name: str, predicted: Sequence[np.ndarray]) -> None:
-    """What every channel should read beside what it read, a file a recording."""
+    """Write predictions beside readings, one file per recording."""
     recordings = diagnosis.predictor.recordings
     for number, recording in enumerate(recordings):
         label = f"_{number + 1}" if len(recordings) > 1 else ""

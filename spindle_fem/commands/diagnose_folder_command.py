@@ -45,7 +45,7 @@ COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class FolderOrder:
-    """What :func:`diagnose_folder` does with every recording.
+    """Options of :func:`diagnose_folder` that apply to every recording.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ def diagnose_folder(
 
 
 def _diagnosed(order: FolderOrder, recording: Path, folder: Path) -> Row:
-    """Row of one recording, diagnosed in whatever process; never an error of its own."""
+    """Row of one recording, diagnosed in any process; errors become part of the row."""
     started = time.perf_counter()
     row: Row = dict.fromkeys(COLUMNS)
     try:
@@ -175,12 +175,12 @@ def _diagnosed(order: FolderOrder, recording: Path, folder: Path) -> Row:
     except (SpindleFemError, OSError, ArithmeticError, ValueError) as error:
         row |= {"status": FAILED, "reason": f"{type(error).__name__}: {error}"}
     else:
-        row |= _told(content)
+        row |= _cells(content)
     return row | {"wall_s": round(time.perf_counter() - started, 2)}
 
 
-def _told(content: Mapping[str, Any]) -> Row:
-    """What a diagnosis says, as cells."""
+def _cells(content: Mapping[str, Any]) -> Row:
+    """Cells from the result of a diagnosis."""
     fit = content["fit"]
     return {
         "verdict": content["verdict"],

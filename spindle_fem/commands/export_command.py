@@ -20,7 +20,7 @@ def export_machine(
     recordings: Iterable[str | Path | Recording] = (),
     progress: Callable[[str], None] = lambda stage: None,
 ) -> dict[str, Any]:
-    """Write the fast model of a machine to a file of the kind that its suffix says.
+    """Write the fast model of a machine to a file in the format of its suffix.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ def check_machine(
     Parameters
     ----------
     picture : Path, optional
-        Drawing of the section to write, of a faulty machine with the faults marked.
+        Drawing of the section to write, with any faults marked.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def check_machine(
 
 
 def _operation_rows(spec: MachineSpec) -> list[dict[str, str]]:
-    """What drives the machine, in customary units."""
+    """Operating point of the machine, in customary units."""
     point, coolant = spec.operation, spec.coolant
     rows = {
         "speed": f"{point.speed * 30.0 / math.pi:.6g} rpm",
@@ -263,7 +263,7 @@ def _draw_faults(picture: Path, machine: str | Path, overrides: Iterable[str], e
 
 
 def _lost_to_air(spec: MachineSpec) -> list[dict[str, str]]:
-    """Warning of a machine of which nothing that stands loses heat to its surroundings."""
+    """Warning for a machine without any stationary surface that loses heat to its surroundings."""
     standing = {part.name for part in spec.part if not part.rotating}
     cooled = {name for film in spec.film for name in film.surface}
     if any(surface.name in cooled and surface.part in standing for surface in spec.surface):

@@ -47,7 +47,7 @@ ALL = "all"
 
 @dataclass(frozen=True, slots=True)
 class Planned:
-    """A plan with how it was asked for."""
+    """A plan with its inputs."""
 
     plan: MeasurementPlan
     conditions: Conditions
@@ -69,7 +69,7 @@ def plan(
     overrides: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Say which effects a machine's sensors and a test could tell apart, and what would tell more.
+    """Report which effects a machine's sensors and a test could distinguish, and how to distinguish more.
 
     Parameters
     ----------
@@ -144,9 +144,9 @@ def planned_measurement(
     compare: bool = True,
     progress: Progress = lambda stage: None,
 ) -> Planned:
-    """What :func:`plan` works out, before anything is written; parameters as there.
+    """Result of :func:`plan` before anything is written; parameters as there.
 
-    ``compare`` says whether other tests are simulated too.
+    ``compare`` selects whether other tests are simulated too.
     """
     overrides = tuple(overrides)
     names = partial(recordable_names, machine, overrides)
@@ -217,7 +217,7 @@ def _input(text: str) -> tuple[str, tuple[float, str]]:
 
 
 def _sensors(asked: Sequence[str], known: Mapping[str, Sensor]) -> tuple[Sensor, ...]:
-    """Sensors that are asked for, by the probe that each reads, with the noise that is given."""
+    """Requested sensors, by the probe that each reads, with their noise."""
     if not known:
         raise SpecError(
             "sensors",
@@ -247,7 +247,7 @@ def _sensors(asked: Sequence[str], known: Mapping[str, Sensor]) -> tuple[Sensor,
 def _of_recording(
     read: Recording, asked: Sequence[str], conditions: Conditions
 ) -> tuple[Recording, tuple[Sensor, ...]]:
-    """A recording's inputs with the sensors asked for, those of the recording unless others are."""
+    """A recording's inputs with the requested sensors, or those of the recording if none are requested."""
     own = {
         probe: Sensor(name, probe, float(sigma))
         for name, probe, sigma in zip(read.temperature_names, read.probes, read.sigma, strict=True)

@@ -85,7 +85,7 @@ def _require_apart(files: list[Path], folder: Path) -> None:
 
 
 def _read_back(texts: dict[str, str], files: list[Path]) -> Recording:
-    """The recording that texts make, read before any of them stands where it was asked for."""
+    """Recording made from texts, read from a temporary folder before any of them is written to its place."""
     with TemporaryDirectory() as stage:
         for name, text in texts.items():
             (Path(stage) / name).write_text(text, encoding="utf-8", newline="")
@@ -109,7 +109,7 @@ def show(recording: str | Path, file: str | Path) -> list[str]:
     Raises
     ------
     SpindleFemError
-        The recording cannot be used, or the picture has another ending or no folder.
+        The recording cannot be used, or the picture has another suffix or no folder.
     """
     file = Path(file)
     if file.suffix.lower() != ".png":

@@ -8,7 +8,7 @@ from pathlib import Path
 from spindle_fem.errors import BadInputError
 from spindle_fem.results.output_folder import reading_results, require_complete
 
-# What tells a command's folder, and the function that writes its page again: module and name.
+# File that identifies a command's folder, and the function that writes its page again: module and name.
 _WRITERS = {
     "crosscheck.json": ("crosscheck_report", "write_crosscheck_report"),
     "diagnosis.json": ("diagnosis_report", "write_diagnosis_report"),

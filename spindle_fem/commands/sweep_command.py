@@ -33,9 +33,9 @@ def sweep_machine(
     scheduler: str | None = None,
     progress: bool = False,
 ) -> dict[str, Any]:
-    """Solve every design of a study and report what they say.
+    """Solve every design of a study and report the results.
 
-    A study that was stopped goes on where it ended; rows that are in the
+    A study that was stopped resumes where it ended; rows that are in the
     folder's table already are not solved again.
 
     Parameters
@@ -94,7 +94,7 @@ def sweep_machine(
 def _pictured(
     place: Path, summary: Mapping[str, Any], tasks: Sequence[DesignTask], *, solved_now: bool
 ) -> dict[int, ThermalResult]:
-    """Fields of the designs to picture; none where the folder has their picture already."""
+    """Fields of the designs to picture; none if the folder has their picture already."""
     picture = place / FIGURE_FOLDER / BEST_PICTURE
     old = place / SUMMARY_FILE
     if not solved_now and picture.is_file() and old.is_file():

@@ -96,7 +96,7 @@ def run_transient_study(
 def _fields(
     path: Path, machine: PreparedMachine, study: TransientStudy
 ) -> Iterator[Callable[[ThermalState], None]]:
-    """Keeper of the fields that a study asks for."""
+    """Writer of the fields that a study requests."""
     path.unlink(missing_ok=True)
     if study.fields_every is None:
         yield lambda state: None

@@ -5,8 +5,8 @@ from __future__ import annotations
 from rich.progress import ProgressColumn, Task
 from rich.text import Text
 
-# Of a diagnosis, what has usually passed when a stage begins: medians over 40 spindles and networks, of which
-# those with one effect end earlier and those with three go on for twice as long.
+# Share of a diagnosis that has usually passed when a stage begins: medians over 40 spindles and networks, of
+# which those with one effect end earlier and those with three take twice as long.
 DIAGNOSIS_SHARES = {
     "diagnosis: screening": 0.14,
     "diagnosis: changes and states that switch": 0.18,
@@ -18,7 +18,7 @@ DIAGNOSIS_SHARES = {
 
 
 def time_left(begun: float, share: float, now: float) -> float | None:
-    """Seconds that a command goes on as a rule; None while nothing can be said.
+    """Usual remaining time of a command, s; None if unknown.
 
     Parameters
     ----------
@@ -39,6 +39,6 @@ class TimeLeft(ProgressColumn):
     """Time left of a task with ``begun`` and ``share``, as :func:`time_left` takes them."""
 
     def render(self, task: Task) -> Text:
-        """Empty while nothing can be said, and once it takes longer than usual."""
+        """Empty if the remaining time is unknown, and once it takes longer than usual."""
         left = time_left(task.fields["begun"], task.fields["share"], task.elapsed or 0.0)
         return Text(f"as a rule {left:.0f} s left" if left else "")

@@ -1,4 +1,4 @@
-"""How much a command says on the terminal: errors alone, results and progress, or every stage as a line."""
+"""Amount of terminal output of a command: errors alone, results and progress, or every stage as a line."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from spindle_fem.results.run_log import LINE, LOGGER, WARNINGS
 
 
 class Verbosity:
-    """What was chosen for this command."""
+    """Choice for this command."""
 
     quiet = False
     verbose = False
 
 
 def choose_verbosity(*, quiet: bool, verbose: bool) -> None:
-    """Set how much this process says; warnings go to the log, and to the terminal when verbose."""
+    """Set the verbosity of this process; warnings go to the log, and to the terminal when verbose."""
     Verbosity.quiet, Verbosity.verbose = quiet, verbose
     logging.captureWarnings(True)
     for logger in (LOGGER, WARNINGS):

@@ -113,7 +113,7 @@ def _run(place: Path, _design: int | None, _progress: Progress) -> tuple[str, Sc
 
 
 def _named(names: Any, values: Array) -> dict[str, dict[str, Array]]:
-    """One temperature a name as the spheres of a steady scene take them."""
+    """Temperatures by name in the form that the spheres of a steady scene need."""
     return {
         str(name): {TEMPERATURE: np.array([float(value)])} for name, value in zip(names, values, strict=True)
     }

@@ -1,1 +1,1 @@
-"""Laws of bearings, coolant and surroundings; none of them knows a mesh."""
+"""Laws of bearings, coolant and surroundings, independent of any mesh."""

@@ -178,10 +178,10 @@ class _Run:
         source: CoupledInputs,
         start: ThermalState,
         watch: Watch,
-        told: frozenset[float],
+        reported: frozenset[float],
     ) -> None:
         self.machine, self.source, self.stop = machine, source, watch.stop
-        self._told, self._progress = told, watch.progress
+        self._reported, self._progress = reported, watch.progress
         self.hottest: list[float] = []
         self.coldest: list[float] = []
         self.ends: list[tuple] = []
@@ -209,7 +209,7 @@ class _Run:
                 f"the temperatures run away: {kelvin_to_celsius(self.hottest[-1]):.0f} °C.",
                 "Lower the speed or the preload, or cool more.",
             )
-        if state.time in self._told:
+        if state.time in self._reported:
             self._progress(f"{state.time / 3600.0:.2f} h, {kelvin_to_celsius(self.hottest[-1]):.1f} °C")
         self.stopped = self.stop is not None and self.stop(state)
         return self.stopped

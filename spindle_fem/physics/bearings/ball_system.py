@@ -1,7 +1,7 @@
 """Balls between rings that move together: geometry of eqs 19-21 and the bordered Newton method.
 
 A system holds any number of balls, each with its own bearing; ``weight`` lets
-one ball stand for all of an axially loaded bearing. The rings' motion is a
+one ball represent all of an axially loaded bearing. The rings' motion is a
 short vector of displacements (axial, two radial, two tilts, or one common
 shaft displacement of a whole preloaded set) that enters every ball through
 ``axial_map`` and ``radial_map``. Forces on the rings follow from the same maps
@@ -30,12 +30,12 @@ _MOST_ITERATIONS = 60
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BallSystem:
-    """Balls, the grooves they run in and how the rings' displacements move the grooves.
+    """Balls, the grooves they run in and the movement of the grooves with the rings' displacements.
 
     Attributes
     ----------
     ball_diameter, pitch_diameter, mass, inertia, compliance, weight : (n,) ndarray, SI
-        ``weight`` is the number of balls that a row stands for.
+        ``weight`` is the number of balls that a row represents.
     groove_curvature : (n, 2) ndarray, [-]
     rest_length : (n, 2) ndarray, [m]
         Groove radius less ball radius, at the temperatures of ring and ball.
@@ -103,7 +103,7 @@ def build_ball_rows(
     ----------
     azimuth : (n,) ndarray, [rad]
     weight : float
-        Balls that each row stands for.
+        Number of balls that each row represents.
     ring_rise : (inner, outer), [K]
         Temperature above assembly.
     ball_rise : float, [K]
@@ -277,7 +277,7 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BorderedSolution:
-    """Where the Newton method ended; ``converged`` says whether the residual is small enough.
+    """Final state of the Newton method; ``converged`` is true if the residual is small enough.
 
     ``tangent`` is the stiffness of the ring displacements, (m, m), N/m and
     N m/rad, with every ball in equilibrium.

@@ -52,7 +52,7 @@ _SPACING_OVER_BALL = 1.7
 
 @dataclass(frozen=True, slots=True)
 class BearingCase:
-    """What a bearing file says, in SI.
+    """Content of a bearing file, in SI.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ def read_bearing_file(path: str | Path) -> BearingCase:
     file, document = Path(path), read_document(path)
     faults: list[SpindleFemError] = []
     document = with_catalogue(document, str(file), faults, GEOMETRY)
-    # What an unknown bearing would have given is no fault of its own.
+    # Keys that an unknown bearing would have supplied are not reported as missing.
     required = {**REQUIRED, "bearing": ()} if faults else REQUIRED
     if not faults and _gives_clearance(document):
         required = {
@@ -230,7 +230,7 @@ def _build_case(
 def _fits(
     values: dict[str, Any] | None, geometry: BearingGeometry, file: str, faults: list[SpindleFemError]
 ) -> RingFits | None:
-    """Seats of the rings; the housing is of steel where nothing else is said."""
+    """Seats of the rings; the housing is of steel unless given otherwise."""
     if values is None:
         return None
     housing = {name: values[key] for key, name in HOUSING_FIELDS.items() if key in values}

@@ -1,4 +1,4 @@
-"""What tells one kind of ball bearing from another: catalogue constants of its friction and ratings."""
+"""Catalogue constants of friction and ratings that distinguish kinds of ball bearing."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def report_of_states(
     Returns
     -------
     dict
-        Units are in the keys; None stands for what does not exist (no film).
+        Units are in the keys; None marks missing quantities (no film).
     """
     first = states[0]
     has_heat = first.heat is not None
@@ -103,7 +103,7 @@ def _number(value: float) -> float | None:
 
 
 def _ball_reports(state: BearingState) -> list[dict[str, Any]]:
-    """One record a ball; equal balls under axial load are written out one by one."""
+    """One record per ball; equal balls under axial load are listed one by one."""
     count, balls = state.geometry.ball_count, state.balls
     reports = []
     for ball in range(count):

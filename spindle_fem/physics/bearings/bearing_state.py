@@ -27,7 +27,7 @@ class BallStates:
     ----------
     azimuth : (n,) ndarray, [rad]
     weight : (n,) ndarray
-        Balls that each row stands for (all of them under axial load alone).
+        Number of balls that each row represents (all of them under axial load alone).
     contact_angle : (n, 2) ndarray, [rad]
     load : (n, 2) ndarray, [N]
     deformation, semi_major, semi_minor : (n, 2) ndarray, [m]
@@ -156,7 +156,7 @@ class BearingState:
 
     @property
     def cage_slip(self) -> float:
-        """Share by which the balls orbit slower than rolling asks, mean over the loaded balls; NaN at rest.
+        """Relative slip of the balls' orbit below pure rolling, mean over the loaded balls; NaN at rest.
 
         Rolling is that of outer race control at the running angles; friction
         alone leaves less than 0.02, gross sliding shows as 0.1 and more.

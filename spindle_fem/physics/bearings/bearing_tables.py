@@ -41,7 +41,7 @@ def read_tables(
     allowed: Mapping[str, Mapping[str, Reader]],
     required: Mapping[str, Sequence[str]],
 ) -> dict[str, dict[str, Any]]:
-    """Tables of a bearing file in SI; what is unknown, wrong or missing goes to ``faults``.
+    """Tables of a bearing file in SI; unknown, wrong or missing keys are added to ``faults``.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def read_tables(
 
 
 def lubricant_of(values: dict[str, Any] | None, file: str, faults: list[SpindleFemError]) -> Lubricant | None:
-    """What a ``[lubricant]`` says; None without one, or with faults."""
+    """Lubricant of a ``[lubricant]`` table; None without one, or with faults."""
     if values is None:
         return None
     fields = {
@@ -96,7 +96,7 @@ def lubricant_of(values: dict[str, Any] | None, file: str, faults: list[SpindleF
 
 
 def heat_of(values: dict[str, Any], file: str, faults: list[SpindleFemError]) -> HeatOptions:
-    """What a ``[heat]`` says; the defaults without one, or with faults."""
+    """Options of a ``[heat]`` table; the defaults without one, or with faults."""
     try:
         return HeatOptions(**{HEAT_FIELDS.get(key, key): value for key, value in values.items()})
     except SpecError as error:

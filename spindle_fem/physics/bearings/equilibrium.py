@@ -86,8 +86,8 @@ def solve_equilibrium(
 ) -> Equilibrium:
     """Equilibrium of all balls and rings at a shaft speed.
 
-    Tries the asked speed from the state at rest, and goes there in adaptive
-    steps of speed where that fails.
+    Tries the requested speed from the state at rest; if that fails, goes there in adaptive
+    steps of speed.
 
     Parameters
     ----------
@@ -343,7 +343,7 @@ def weakly_driven(
 def _continue_in_speed(
     solver: _Solver, speed: float, centre: FloatArray, displacement: FloatArray, where: str
 ) -> _Attempt:
-    """Go from rest to the asked speed in steps that halve on failure."""
+    """Go from rest to the requested speed in steps that halve on failure."""
     reached, step = 0.0, 0.05
     attempt: _Attempt | None = None
     ball_speeds: FloatArray | None = None

@@ -33,7 +33,7 @@ _MOST_ROUNDS = 100
 
 @dataclass(frozen=True, slots=True)
 class RingFits:
-    """How the rings of one bearing sit, at assembly temperature and at rest.
+    """Fits of the rings of one bearing, at assembly temperature and at rest.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class RingFits:
     shaft_bore_diameter : float, [m]
         0 for a solid shaft.
     inner_ring_outer_diameter, outer_ring_inner_diameter : float or None, [m]
-        Cylinders that stand for the grooved faces; None: through the groove bottoms.
+        Cylinders that represent the grooved faces; None: through the groove bottoms.
     ring_density : float, [kg/m³]
 
     Range: mean growth around the axis; a ring bent out of round by radial load
@@ -76,7 +76,7 @@ class FitTemperatures:
 
 @dataclass(frozen=True, slots=True)
 class FitState:
-    """What the seats of one bearing do.
+    """State of the seats of one bearing.
 
     Attributes
     ----------
@@ -186,7 +186,7 @@ class SeatedRings:
 class _Seat:
     """One ring and its counterpart: raceway growth = free + by_pressure p - by_load q, p from the overlap.
 
-    ``overlap`` (m, radial) is that of the bodies apart, ``softness`` (m/Pa) of both together.
+    ``overlap`` (m, radial) is that of the separate bodies, ``softness`` (m/Pa) that of both together.
     """
 
     overlap: float
@@ -211,7 +211,7 @@ class _Seat:
 
 
 def fit_faults(geometry: BearingGeometry, fits: RingFits) -> list[tuple[str, str, str]]:
-    """Every reason why rings cannot sit as ``fits`` says: (key, fault, what is allowed)."""
+    """Every reason why ``fits`` is impossible: (key, fault, what is allowed)."""
     lacking = [
         (key, "it is missing, but a fit needs it.", "Give it.")
         for key in ("bore_diameter", "outer_diameter", "width")
@@ -323,7 +323,7 @@ def mounted_state(geometry: BearingGeometry, fits: RingFits, axial_force: float)
     """Contact angle and approach of a bearing that is mounted with its fits.
 
     The fits close the play, ball loads open it again: at a given axial force
-    one radial force has both the contact angle and the ring growth it asks for.
+    one radial force is consistent with both the contact angle and the ring growth.
 
     Parameters
     ----------
@@ -405,7 +405,7 @@ def _lengths(geometry: BearingGeometry, axial_force: float, angle: float) -> tup
 
 
 def _excess(geometry: BearingGeometry, axial_force: float, angle: float) -> float:
-    """Raceway growth that a contact angle under an axial force asks for, m."""
+    """Raceway growth required by a contact angle under an axial force, m."""
     radial = geometry.curvature_centre_distance * math.cos(geometry.contact_angle)
     return _lengths(geometry, axial_force, angle)[1] * math.cos(angle) - radial
 

@@ -1,4 +1,4 @@
-"""What a heat model of a bearing is asked and answers: inputs, options, and the models by name."""
+"""Interface of the bearing heat models: inputs, options, results, and the models by name."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BallAttitude = Literal["equilibrium", "outer"]
 
 @dataclass(frozen=True, slots=True)
 class HeatOptions:
-    """Which heat model, and the numbers that only it needs.
+    """Choice of heat model, and parameters that only it needs.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class HeatOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeatInputs:
-    """What a bearing's equilibrium hands to the heat models.
+    """Results of a bearing's equilibrium that the heat models use.
 
     ``system``, ``patch``, ``traction`` and ``lubricant`` hold this bearing's
     balls only; ``orbital`` and ``drag`` are (n,).
@@ -84,7 +84,7 @@ class HeatInputs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RollerHeatInputs:
-    """What the equilibrium of a roller bearing hands to the heat models."""
+    """Results of a roller bearing's equilibrium that the heat models use."""
 
     geometry: RollerGeometry
     states: RollerStates

@@ -98,7 +98,7 @@ def _difference_of_ellipse(log_kappa: NDArray[np.float64]) -> NDArray[np.float64
 
 @dataclass(frozen=True, slots=True)
 class ContactConstants:
-    """What relates a load to the ellipse: a = a₁Q^⅓, b = b₁Q^⅓, Q = K δ^1.5.
+    """Constants that relate a load to the ellipse: a = a₁Q^⅓, b = b₁Q^⅓, Q = K δ^1.5.
 
     Attributes
     ----------

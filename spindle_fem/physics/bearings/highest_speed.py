@@ -22,7 +22,7 @@ def highest_speed(pitch_diameter: float) -> float:
 
 def too_fast(spec: MachineSpec, speed: float) -> str | None:
     """Why the bearings of a machine cannot turn at a speed [rad/s]; None where they may or it is NaN."""
-    # Of a definition with other faults, bearings may be of no known type.
+    # In a definition with other faults, bearings may be of no known type.
     types = [spec.bearing_types.get(group.type_name(bearing)) for group, bearing in spec.bearings]
     pitch = max((kind.pitch for kind in types if kind is not None), default=0.0)
     highest = highest_speed(pitch)

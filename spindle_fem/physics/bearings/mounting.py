@@ -1,4 +1,4 @@
-"""How bearings are mounted: sets, preload, temperatures and loads."""
+"""Mounting of bearings: sets, preload, temperatures and loads."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class BearingSet:
         return roughness_from_rms(self.raceway_roughness) + roughness_from_rms(self.ball_roughness)
 
     def with_rigid_rings(self) -> BearingSet:
-        """The same set on rings that keep their size: the contact angle is that of the mounted bearing."""
+        """The set with rings that keep their size: the contact angle is that of the mounted bearing."""
         bearings = tuple(replace(bearing, fits=None) for bearing in self.bearings)
         return replace(self, bearings=bearings, seats=None)
 

@@ -49,9 +49,9 @@ def rating_life(
     load : (n, 2) ndarray, [N]
         Of every ball, or of every roller row after row; inner contact first.
     weight : (n,) ndarray, optional
-        Balls that each row of ``load`` stands for.
+        Number of balls that each row of ``load`` represents.
 
-    Range: the inner ring turns past a load that stands still; steel, clean oil (no a_ISO); aligned rollers.
+    Range: the inner ring turns past a stationary load; steel, clean oil (no a_ISO); aligned rollers.
 
     Source: ISO/TS 16281:2008, basic reference rating life; its load of the contacts is this program's.
     """

@@ -146,7 +146,7 @@ class RingCompliance:
 
     @classmethod
     def joined(cls, parts: Sequence[tuple[int, RingCompliance]]) -> RingCompliance:
-        """Of systems side by side, each with the number of its first displacement."""
+        """Join systems side by side, each given with the number of its first displacement."""
         return cls(
             np.concatenate([first + part.columns for first, part in parts]),
             np.concatenate([part.level for _, part in parts]),

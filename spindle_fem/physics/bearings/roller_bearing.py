@@ -123,7 +123,7 @@ class RollerGeometry:
 
     @property
     def raceway_diameters(self) -> tuple[float, float]:
-        """Of the inner and of the outer raceway, m."""
+        """Diameters of the inner and of the outer raceway, m."""
         return self.pitch_diameter - self.roller_diameter, self.pitch_diameter + self.roller_diameter
 
     @property
@@ -140,21 +140,21 @@ class RollerGeometry:
 
     @property
     def azimuth(self) -> FloatArray:
-        """Of every roller, row after row, from the load's direction, rad; (rows * roller_count,)."""
+        """Azimuth of every roller, row after row, from the load's direction, rad; (rows * roller_count,)."""
         row = 2.0 * np.pi * np.arange(self.roller_count) / self.roller_count
         return np.concatenate([row + number * np.pi / self.roller_count for number in range(self.rows)])
 
     def centrifugal_force(self, speed: float) -> float:
-        """Of one roller at a speed of the inner ring [rad/s], N: rollers orbit as rolling asks."""
+        """Centrifugal force of one roller at a speed of the inner ring [rad/s], N, for pure rolling."""
         mass = self.density * 0.25 * math.pi * self.roller_diameter**2 * self.roller_length
         return 0.5 * mass * self.pitch_diameter * self.orbital_speed(speed) ** 2
 
     def orbital_speed(self, speed: float) -> float:
-        """Of the rollers at a speed of the inner ring, rad/s, as rolling asks."""
+        """Orbital speed of the rollers at a speed of the inner ring, rad/s, for pure rolling."""
         return 0.5 * speed * (1.0 - self.diameter_ratio)
 
     def spin_speed(self, speed: float) -> float:
-        """Of a roller about its own axis, against the cage, rad/s."""
+        """Speed of a roller about its own axis, relative to the cage, rad/s."""
         return 0.5 * speed * (1.0 / self.diameter_ratio - self.diameter_ratio)
 
     def entrainment_speed(self, speed: float) -> float:

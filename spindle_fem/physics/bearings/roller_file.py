@@ -99,7 +99,7 @@ def roller_report(path: str | Path) -> dict[str, Any]:
     file = str(path)
     faults: list[SpindleFemError] = []
     document = with_catalogue(read_document(path), file, faults, _BEARING, "roller")
-    # What an unknown bearing would have given is no fault of its own.
+    # Keys that an unknown bearing would have supplied are not reported as missing.
     required = {**_REQUIRED, "bearing": ()} if faults else _REQUIRED
     tables = read_tables(document, file, faults, _TABLES, required)
     geometry, heat, lubricant = None, HeatOptions("palmgren"), None

@@ -1,4 +1,4 @@
-"""What tells one kind of roller bearing from another: catalogue constants of its friction."""
+"""Catalogue constants of friction that distinguish kinds of roller bearing."""
 
 from __future__ import annotations
 

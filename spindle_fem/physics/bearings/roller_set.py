@@ -36,7 +36,7 @@ FloatArray = NDArray[np.float64]
 # ISO 76: of rollers, where 0.0001 of their diameter stays as dent.
 ROLLER_STATIC_PRESSURE = 4.0e9
 _FULL_FILM = 3.0
-# Clearances are told apart by picometres, so that temperatures that differ by round-off share a solution.
+# Clearances are rounded to picometres, so that temperatures that differ by round-off share a solution.
 _CLEARANCE_DIGITS = 12
 
 
@@ -121,7 +121,7 @@ def solve_roller_set(
 def _dry_state(
     name: str, geometry: RollerGeometry, solved: RollerStates, speed: float, radial: float, film: float
 ) -> BearingState:
-    """State without lubricant; rollers stand in the place of balls, half as long as the major axis."""
+    """State without lubricant; rollers take the place of balls, half as long as the major axis."""
     shape = solved.load.shape
     number, empty = shape[0], np.full(shape, np.nan)
     balls = BallStates(

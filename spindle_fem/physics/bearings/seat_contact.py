@@ -1,7 +1,7 @@
-"""Which rings are tight on their seats, how hard they press, and where a gap opens: all seats at once.
+"""Pressure of rings on their seats and gaps where they open, solved for all seats together.
 
 Seats of one body yield together. With gap g and pressure p at every seat, g = g0 + M p, g ≥ 0, p ≥ 0 and
-g p = 0: the bodies apart would leave gaps g0 (negative: they overlap), M is their compliance. That is
+g p = 0: the separate bodies would leave gaps g0 (negative: overlap), M is their compliance. That is
 the minimum of a convex energy, found by non-negative least squares.
 
 Source: Johnson, Contact Mechanics (1985), section 5.4, for the complementary form.
@@ -99,7 +99,7 @@ class SeatedLaw:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeatBodies:
-    """How the seats of k bearings yield, whatever the state: two seats a bearing, inner ring first.
+    """Compliance of the seats of k bearings, whatever the state: two seats per bearing, inner ring first.
 
     Attributes
     ----------
@@ -194,6 +194,6 @@ class CoupledRings:
 
     @classmethod
     def joined(cls, parts: Sequence[tuple[int, CoupledRings]]) -> CoupledRings:
-        """Of systems side by side, each with the number of its first displacement."""
+        """Join systems side by side, each given with the number of its first displacement."""
         columns = np.concatenate([first + part.columns for first, part in parts])
         return cls(columns, tuple(law for _, part in parts for law in part.laws))

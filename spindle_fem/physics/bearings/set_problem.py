@@ -1,4 +1,4 @@
-"""A set as one ball system with its load, several of them side by side, and where rings stand at rest."""
+"""Build a set, or several side by side, as one ball system with its load, and find its state at rest."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def _centrifugal(geometry: BearingGeometry, speed: float) -> float:
 def _elastic_law(
     bearing_set: BearingSet, temperatures: SetTemperatures, speed: float, external: ExternalLoad
 ) -> tuple[SeatedLaw | None, list[float]]:
-    """How elastic bodies carry the rings of a set, and the growths to look for first (m)."""
+    """Elastic bodies under the rings of a set as a law, and initial guesses of the growths (m)."""
     seats = bearing_set.seats
     if seats is None:
         return None, []
@@ -158,7 +158,7 @@ def _ring_law(
     speed: float,
     external: ExternalLoad,
 ) -> tuple[RingLaw | None, float]:
-    """How the rings of a bearing give way, and the growth to look for first (m); None for rigid rings."""
+    """Compliance of the rings of a bearing, and an initial guess of the growth (m); None for rigid rings."""
     if bearing.fits is None:
         return None, 0.0
     rise = FitTemperatures(

@@ -1,4 +1,4 @@
-"""From a solved ball system to the records of each bearing: films, heat, warnings."""
+"""Convert a solved ball system to the records of each bearing: films, heat, warnings."""
 
 from __future__ import annotations
 
@@ -366,7 +366,7 @@ def _heat_warnings(name: str, geometry, heat: HeatOptions) -> list[CodedWarning]
 
 
 def _cut(record, part: slice):
-    """The same record for some rows; fields that are no arrays stay."""
+    """Record with some rows only; fields that are not arrays are kept."""
     names = type(record).__slots__
     return type(record)(
         *(value[part] if isinstance(value := getattr(record, name), np.ndarray) else value for name in names)

@@ -119,7 +119,7 @@ def ellipse_quadrature(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPatch:
-    """What the ellipses' size and place fix, whatever the speeds; arrays (..., n, 2[, q[, s]])."""
+    """Speed-independent quantities of the contact ellipses; arrays (..., n, 2[, q[, s]])."""
 
     load: FloatArray
     cosine: FloatArray

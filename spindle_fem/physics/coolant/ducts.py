@@ -70,7 +70,7 @@ class DuctFlow:
 
     @property
     def properties(self) -> CoolantProperties:
-        """Of the coolant as it enters."""
+        """Properties of the coolant at the inlet."""
         return self.coolant.properties(self.inlet_temperature)
 
     @property
@@ -80,12 +80,12 @@ class DuctFlow:
 
     @property
     def reynolds(self) -> float:
-        """On the hydraulic diameter, [-]."""
+        """Reynolds number on the hydraulic diameter, [-]."""
         return self.velocity * self.section.hydraulic_diameter / float(self.properties.kinematic_viscosity)
 
     @property
     def prandtl(self) -> float:
-        """Of the coolant, [-]."""
+        """Prandtl number of the coolant, [-]."""
         return float(self.properties.prandtl)
 
     @property
@@ -120,7 +120,7 @@ class DuctFlow:
 
 @dataclass(frozen=True, slots=True)
 class DuctFilm:
-    """What a film law answers: Nusselt number on the hydraulic diameter, source, what leaves its range."""
+    """Result of a film law: Nusselt number on the hydraulic diameter, source, violations of its range."""
 
     nusselt: float
     source: str

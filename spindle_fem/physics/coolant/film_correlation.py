@@ -1,4 +1,4 @@
-"""What a film model of the cooling channel is asked and answers, and correlations that are film models."""
+"""Interface of the film models of the cooling channel, and film models made from correlations."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class FilmBand:
 
 @dataclass(frozen=True, slots=True)
 class FilmNumbers:
-    """What a film model answers.
+    """Result of a film model.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the correlations for helical channels say together: value, low and high."""
+"""Combine the correlations for helical channels: value, low and high."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _laminar_band(flow: FlowGroups) -> FilmBand:
         raised = np.maximum(candidates[name], floor)
         applicable.append(raised if known.counts else np.where(known.covers_flow(flow), raised, value))
 
-    # The oil measurements stand when one of the two covers the state; the theory of
+    # The oil measurements hold when one of the two covers the state; the theory of
     # Manlapaz and Churchill and the straight duct always do.
     measured_covers = nusselt_seban_mclaughlin.covers_flow(flow) | nusselt_janssen_hoogendoorn.covers_flow(
         flow

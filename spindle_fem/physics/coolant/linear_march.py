@@ -20,7 +20,7 @@ from spindle_fem.physics.coolant.march import exponential_shares
 
 @dataclass(frozen=True, slots=True)
 class MarchMaps:
-    """What a march makes of its walls, its inlet and its friction heat, each by itself.
+    """Linear maps of a march from its walls, its inlet and its friction heat, each by itself.
 
     All are linear in temperatures at given film coefficients:
     ``bulk = bulk_from_wall @ wall + bulk_from_inlet * inlet + bulk_from_friction``,
@@ -101,7 +101,7 @@ def march_maps(
 
 
 def outlet_stretch(transfer_units: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What film times area is multiplied by to count from a cell's outlet, and its derivative.
+    """Factor on film times area to refer a cell's heat to its outlet temperature, and its derivative.
 
     With N transfer units the heat of a cell of uniform wall is
     ``h A (T_wall - T_outlet) (e^N - 1) / N``.

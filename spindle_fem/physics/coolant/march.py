@@ -187,7 +187,7 @@ class ChannelMarch:
 
 @dataclass(frozen=True, slots=True)
 class FilmChoice:
-    """Which film coefficient a march takes.
+    """Choice of film coefficient for a march.
 
     Attributes
     ----------
@@ -230,7 +230,7 @@ class DrivenChannel:
     wetted_area : (..., n) array_like, [m²]
         Of each cell, from inlet to outlet.
     pumping_power : float or (n, 1, 1) ndarray, [W]
-        Friction heat of all starts, alike in each, spread over the wetted area.
+        Friction heat of all starts, equal in each, spread over the wetted area.
 
     >>> from spindle_fem.physics.coolant.coolants.iso_vg_32 import OilIsoVg32
     >>> section = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0)
@@ -282,7 +282,7 @@ class DrivenChannel:
         return ChannelMarch(march=march, film=film, mass_flow=mass_flow)
 
     def settle(self, wall: ArrayLike) -> ChannelMarch:
-        """The march of one design whose properties are those of its own temperatures.
+        """March of one design with properties at its own temperatures.
 
         Parameters
         ----------

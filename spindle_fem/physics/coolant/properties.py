@@ -1,4 +1,4 @@
-"""What a coolant is: its properties against temperature, within the range of their source."""
+"""Properties of a coolant over temperature, within the range of their source."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a pump delivers into a circuit: the flow asked for, or less where its pressure does not suffice."""
+"""Flow that a pump delivers into a circuit: the requested flow, or less if its pressure does not suffice."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from scipy.optimize import brentq
 from spindle_fem.errors import OutOfValidityError
 from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
-# Of the flow asked for: relative error allowed in the flow delivered, and the least that is looked at.
+# Relative tolerance of the flow delivered, and smallest flow considered, relative to the requested flow.
 _TOLERANCE = 1.0e-12
 _TRICKLE = 1.0e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Pump:
-    """A pump that gives the flow asked for as far as its pressure goes.
+    """A pump that delivers the requested flow as far as its pressure allows.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Pump:
 
     @property
     def is_limited(self) -> bool:
-        """Whether pressure can keep the flow below what is asked for."""
+        """Whether pressure can keep the flow below the requested flow."""
         return np.isfinite(self.pressure_limit) or bool(self.curve_flow)
 
     def pressure(self, flow: float) -> float:
@@ -81,7 +81,7 @@ class Pump:
         return min(given, self.pressure_limit)
 
     def delivered(self, pressure_drop: Callable[[float], float]) -> float:
-        """The flow at which the circuit takes what the pump gives; at most the flow asked for, m³/s.
+        """Flow at which the circuit's pressure drop equals the pump's; at most the requested flow, m³/s.
 
         Parameters
         ----------

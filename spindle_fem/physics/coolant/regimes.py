@@ -36,7 +36,7 @@ EXTRAPOLATION_WIDENING = 1.25
 
 @dataclass(frozen=True, slots=True)
 class ChannelState:
-    """What flows through a channel and at which temperatures.
+    """Flow through a channel and its temperatures.
 
     Attributes
     ----------
@@ -60,8 +60,8 @@ class FilmCoefficient:
     Attributes
     ----------
     value, low, high : float or (n,) ndarray, [W/(m²·K)]
-        What the model answers, and the spread of what the applicable
-        correlations for helical channels answer (it always contains the value).
+        Result of the model, and the spread of the applicable
+        correlations for helical channels (it always contains the value).
     regime : str or (n,) ndarray of str
         ``laminar``, ``transition`` or ``turbulent`` flow in the coil; with the
         model ``paper`` what the paper takes it for.
@@ -104,8 +104,8 @@ def select_film(model: str, section: ChannelSection, state: ChannelState) -> Fil
     OutOfValidityError
         Unknown model, no flow, a bulk temperature outside the coolant's range.
 
-    Range: what leaves a source's range is answered, marked ``in_range`` false,
-    widened in ``low`` and ``high`` and said in ``warnings``.
+    Range: values outside a source's range are returned, marked ``in_range`` false,
+    widened in ``low`` and ``high`` and reported in ``warnings``.
 
     Source: that of the model, in ``coolant.film_models``.
 
@@ -193,7 +193,7 @@ def _flow_groups(
 def _wall_in_range(
     wall: NDArray[np.float64], coolant: Coolant
 ) -> tuple[NDArray[np.float64], tuple[CodedWarning, ...]]:
-    """Wall temperature for the (weak) wall correction, said when it is cut."""
+    """Wall temperature for the (weak) wall correction, with a warning if it is clipped."""
     lowest, highest = coolant.lowest_temperature, coolant.highest_temperature
     fault = range_fault("wall temperature in K", wall, lowest, highest)
     if not fault:

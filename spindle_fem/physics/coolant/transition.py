@@ -1,4 +1,4 @@
-"""Where laminar flow in a helical channel ends, and the bridge to turbulent flow."""
+"""End of laminar flow in a helical channel, and the bridge to turbulent flow."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class ElasticMaterial:
 
     @property
     def stiffness(self) -> Stiffness:
-        """Of the solid metal, with Lamé's constants Λ and μ.
+        """Stiffness of the solid metal, with Lamé's constants Λ and μ.
 
         >>> ElasticMaterial(200e9, 0.25, 1e-5).stiffness.normal[0, :2] / 1e9
         array([240.,  80.])
@@ -73,7 +73,7 @@ class ElasticMaterial:
         return Stiffness(normal, np.full(3, shear), self.thermal_expansion * normal.sum(axis=1), self.density)
 
     def lands(self, height: float, width: float, pitch: float) -> Stiffness:
-        """Of a wall layer in which lands alternate with the turns of a channel along z.
+        """Stiffness of a wall layer in which lands alternate with the turns of a channel along z.
 
         A land carries radial and hoop stress as a plate that is free in z. Against shear in zr it bends
         between the walls that hold both its edges: a guided beam of unit breadth yields by

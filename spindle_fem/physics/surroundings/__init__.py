@@ -1,4 +1,4 @@
-"""What surrounds the machine: air, radiation, rotating surfaces, gaps, joints.
+"""Surroundings of the machine: air, radiation, rotating surfaces, gaps, joints.
 
-Knows no mesh and no machine: numbers in SI in, numbers in SI out.
+Independent of mesh and machine: numbers in SI in, numbers in SI out.
 """

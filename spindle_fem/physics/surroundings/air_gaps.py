@@ -12,7 +12,7 @@ from spindle_fem.validity import POSITIVE, require_range
 
 @dataclass(frozen=True, slots=True)
 class AirGap:
-    """What a law of a gap may ask for.
+    """Quantities that a law of a gap may use.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a law of a joint's conductance is: a formula, the units of its quantities, and its range."""
+"""Law of a joint's conductance: a formula, the units of its quantities, and its range."""
 
 from __future__ import annotations
 

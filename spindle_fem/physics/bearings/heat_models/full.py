@@ -21,7 +21,7 @@ from spindle_fem.physics.bearings.lubricant_film import film_groups, inlet_shear
 @HEAT_MODELS.register
 @friction_model(ball_attitude="equilibrium", needs_boundary=True, counts_cage=True)
 def full(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
-    """What the paper counts, and the hydrodynamic rolling resistance (Houpert), hysteresis, cage and seal."""
+    """Heat terms of the paper plus hydrodynamic rolling resistance (Houpert), hysteresis, cage and seal."""
     sliding = paper(inputs, options)
     rolling, hysteresis = _rolling_powers(inputs, options)
     rolling_contacts = {"rolling": rolling, "hysteresis": hysteresis}

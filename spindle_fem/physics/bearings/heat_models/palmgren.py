@@ -23,7 +23,7 @@ from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
 
 
 def of_rollers(inputs: RollerHeatInputs, options: HeatOptions) -> BearingHeat:
-    """The same moments of roller bearings."""
+    """Palmgren's moments of roller bearings."""
     moment = palmgren_roller_moment(
         inputs.geometry,
         inputs.speed,

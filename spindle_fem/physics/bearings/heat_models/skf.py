@@ -24,7 +24,7 @@ from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
 
 
 def of_rollers(inputs: RollerHeatInputs, options: HeatOptions) -> BearingHeat:
-    """The same moments of roller bearings, whose full-film coefficient is that of their kind."""
+    """SKF moments of roller bearings, whose full-film coefficient is that of their kind."""
     moment = skf_roller_moment(
         inputs.geometry,
         inputs.speed,
@@ -143,7 +143,7 @@ def skf_roller_moment(
     speed : float, [rad/s]
     kinematic_viscosity : float, [m²/s]
     driving_load : float, [N]
-        Radial load, or what stands for it (``RollerStates.driving_load``).
+        Radial load, or its equivalent (``RollerStates.driving_load``).
     friction_boundary : float
         0.12-0.15.
     replenishment : float

@@ -8,7 +8,7 @@ from spindle_fem.errors import OutOfValidityError
 from spindle_fem.physics.coolant.duct_kinds import DUCT_KINDS
 from spindle_fem.physics.coolant.ducts import DuctSection
 
-# Of inner over outer diameter: from here the slit's numbers hold within 2 %.
+# Inner over outer diameter above which the slit's numbers hold within 2 %.
 NARROW = 0.5
 
 

@@ -16,7 +16,7 @@ AIR_CONDUCTIVITY = 0.026
 
 @GAP_LAWS.register
 def becker_kaye(gap: AirGap) -> GapCoefficient:
-    """Coefficient between one wall and the other, also beyond the range, which is then said."""
+    """Coefficient between the two walls, also beyond the range, which is then reported."""
     width = gap.outer_radius - gap.inner_radius
     taylor = taylor_number(gap.angular_speed, gap.inner_radius, width, AIR_KINEMATIC_VISCOSITY)
     value = gap_coefficient_becker_kaye(gap.angular_speed, gap.inner_radius, width, extrapolate=True)
