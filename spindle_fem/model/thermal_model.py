@@ -23,6 +23,8 @@ Matrix = Array | sparse.csr_array
 Matrices = Sequence[sparse.csr_array] | Array
 
 FORMAT = "spindle-fem/thermal-model/1"
+# Fields that hold one matrix (n, n) for each coefficient.
+MATRIX_FIELDS = ("operators", "cell_film", "storage")
 # Relative rounding allowed at the ends of a coefficient's range.
 RANGE_ROUNDING = 1e-9
 
@@ -178,17 +180,15 @@ def project(model: ThermalModel, basis: Array, one: Array) -> ThermalModel:
     """
     size = basis.shape[1]
     own = {name: getattr(model, name) for name in ThermalModel.__slots__}
+    own |= {name: _projected(getattr(model, name), basis) for name in MATRIX_FIELDS}
     own |= {
-        "operators": _projected(model.operators, basis),
         "fluid_load": np.asarray(model.fluid_load @ basis).reshape(-1, size),
-        "storage": _projected(model.storage, basis),
         "places": np.asarray(model.places @ basis),
         "probes": np.asarray(model.probes @ basis),
         "one": one,
         "probe_gradients": _dense(model.probe_gradients @ basis).reshape(-1, 2, size)
         if model.probe_gradients.shape[0]
         else np.zeros((0, 2, size)),
-        "cell_film": _projected(model.cell_film, basis),
         "cell_load": np.asarray(model.cell_load @ basis) if model.cell_area.size else np.zeros((0, size)),
         "n_full": model.n_full or model.size,
         "nodes": (basis.T @ model.nodes).astype(np.float32) if model.nodes.size else model.nodes,
@@ -212,8 +212,11 @@ def _projected(matrices: Matrices, basis: Array) -> Array:
 
 
 def _projected_sparse(matrix: sparse.csr_array, basis: Array) -> Array:
-    """``Vᵀ K V``; most operators live on a surface, and only its rows are touched."""
+    """``Vᵀ K V``; most operators live on a surface or in a material, and only its rows are touched."""
     own = np.flatnonzero(np.diff(matrix.indptr))
+    if len(own) and own[-1] - own[0] + 1 == len(own):
+        together = slice(int(own[0]), int(own[-1]) + 1)
+        return basis[together].T @ (matrix[together, together] @ basis[together])
     if 2 * len(own) > matrix.shape[0]:
         return basis.T @ (matrix @ basis)
     rows = basis[own]

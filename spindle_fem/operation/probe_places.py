@@ -43,17 +43,19 @@ def near_places(operators: ThermalOperators, probes: Sequence[Probe]) -> Iterato
     str, (n_unknowns,) ndarray
         The weights sum to 1.
     """
-    corners = _corners(operators)
+    corners, storage = _corners(operators), operators.matrix(operators.storage)
     for probe, position in zip(probes, probe_positions(probes), strict=True):
-        yield NEAR + probe.name, _patch(operators, probe.part, np.sum((corners - position) ** 2, axis=1))
+        squared = np.sum((corners - position) ** 2, axis=1)
+        yield NEAR + probe.name, _patch(operators, storage, probe.part, squared)
 
 
 def around_places(operators: ThermalOperators, probes: Sequence[Probe]) -> Iterator[tuple[str, Array]]:
     """Patch by distance in the meridian plane, by name ``around.<probe>``: a ring about the axis."""
     x, y, z = _corners(operators).T
-    radius = np.hypot(x, y)
+    radius, storage = np.hypot(x, y), operators.matrix(operators.storage)
     for probe in probes:
-        yield AROUND + probe.name, _patch(operators, probe.part, (radius - probe.r) ** 2 + (z - probe.z) ** 2)
+        squared = (radius - probe.r) ** 2 + (z - probe.z) ** 2
+        yield AROUND + probe.name, _patch(operators, storage, probe.part, squared)
 
 
 def _corners(operators: ThermalOperators) -> Array:
@@ -61,13 +63,15 @@ def _corners(operators: ThermalOperators) -> Array:
     return corners if operators.prolongation is None else corners[: operators.prolongation.shape[1]]
 
 
-def _patch(operators: ThermalOperators, part: str, squared: Array) -> Array:
+def _patch(operators: ThermalOperators, storage: sparse.csr_array, part: str, squared: Array) -> Array:
     """Weights that fall with the squared distance [m²] of corner nodes."""
     # Linear between corners: a quadratic interpolation could undershoot zero.
     weight = np.exp(-1.5 * squared / STANDARD_DISTANCE**2)
     if operators.prolongation is not None:
         weight = operators.prolongation @ weight
-    vector = operators.part_storage(part) @ weight
+    # Storage couples no two parts.
+    weight[operators.part_of_unknown != operators.part_index(part, "probe")] = 0.0
+    vector = storage @ weight
     return vector / vector.sum()
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.errors import NoSteadyStateError
+from spindle_fem.model.mesh.column_solver import solve_many
 from spindle_fem.model.mesh.equations import assemble_system
-from spindle_fem.model.mesh.linear_solvers import solve_many
 from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady, split_unknowns
 from spindle_fem.operation.bearing_heat import BearingTemperatures
 from spindle_fem.operation.coefficients import ball_conductances

@@ -17,10 +17,11 @@ from spindle_fem.errors import (
     UnknownSurfaceError,
 )
 from spindle_fem.machine.meshing.simple_bodies import build_joined_tubes
+from spindle_fem.model.mesh.column_solver import solve_many
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, FilmLaw, LumpedLink, LumpedNode
 from spindle_fem.model.mesh.equations import assemble_capacity, assemble_system
 from spindle_fem.model.mesh.heat_balance import require_balance
-from spindle_fem.model.mesh.linear_solvers import build_preconditioner, solve_linear, solve_many
+from spindle_fem.model.mesh.linear_solvers import build_preconditioner, solve_linear
 from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.model.mesh.temperature_films import film_heat_flux, linearise_films
@@ -274,7 +275,7 @@ def test_several_loads_that_do_not_converge_are_refused(quadratic_system):
     system, matrix = quadratic_system, sparse.csr_array(quadratic_system.full_matrix())
     preconditioner = build_preconditioner(system, "multigrid")
     loads = np.random.default_rng(2).normal(size=(matrix.shape[0], 4))
-    with pytest.raises(ConvergenceError, match=r"of the solution after 2 iterations.*Asked: 1.0e-12"):
+    with pytest.raises(ConvergenceError, match=r"times what was asked after 2 iterations"):
         solve_many(matrix, loads, preconditioner, relative_tolerance=1e-12, max_iterations=2)
     with pytest.raises(ConvergenceError, match="not positive definite"):
         solve_many((-1.0 * matrix).tocsr(), loads, preconditioner, relative_tolerance=1e-6)

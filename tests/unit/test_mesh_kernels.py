@@ -11,12 +11,13 @@ from spindle_fem.errors import MeshQualityError, MeshTagError, SpecError
 from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes
 from spindle_fem.machine.meshing.tagged_mesh import Joint
 from spindle_fem.model.mesh import element_integrals, forms, threads
+from spindle_fem.model.mesh.column_solver import solve_many
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
 from spindle_fem.model.mesh.equations import assemble_system
 from spindle_fem.model.mesh.huge_pages import room
 from spindle_fem.model.mesh.kernels import multigrid_loops
 from spindle_fem.model.mesh.kernels.team_loops import LARGEST, conjugate_step
-from spindle_fem.model.mesh.linear_solvers import build_preconditioner, multiply, solve_linear, solve_many
+from spindle_fem.model.mesh.linear_solvers import build_preconditioner, multiply, solve_linear
 from spindle_fem.model.mesh.linear_system import merged
 from spindle_fem.model.mesh.mesh_operators import build_operators
 from spindle_fem.model.mesh.multigrid import build_hierarchy, scales_of_smoothing

@@ -114,10 +114,10 @@ def test_joint_acts_on_the_jump_only(order):
 
 def test_unit_matrices_of_a_part_sum_to_the_whole():
     operators = build_operators(MESH, 2)
-    total = 3.0 * operators.part_conduction("inner") + 5.0 * operators.part_conduction("outer")
+    total = 3.0 * operators.parts_conduction(["inner"]) + 5.0 * operators.parts_conduction(["outer"])
     whole = operators.matrix(operators.sum_conduction(np.array([3.0, 5.0])))
     assert _largest_difference(total, whole) < ROUND_OFF
-    mass = operators.part_storage("outer")
+    mass = operators.parts_storage(["outer"])
     assert mass.sum() == pytest.approx(operators.part_volume["outer"], rel=1e-12)
 
 
@@ -178,7 +178,7 @@ def test_unknown_names_and_orders():
     with pytest.raises(UnknownSurfaceError, match=r'names joint "inner\|outter"'):
         operators.joint_matrix("inner|outter")
     with pytest.raises(UnknownSurfaceError, match='names part "shaft"'):
-        operators.part_conduction("shaft")
+        operators.parts_conduction(["shaft"])
     with pytest.raises(SpecError, match=r"order: 3\. Allowed: 1 or 2"):
         build_operators(MESH, 3)
 

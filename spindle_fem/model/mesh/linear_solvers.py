@@ -23,8 +23,6 @@ from spindle_fem.model.mesh.threads import chunk_bounds, row_blocks, run_blocks,
 DIRECT_BELOW = 2_000
 RELATIVE_TOLERANCE = 1e-11
 MAX_ITERATIONS = 400
-# Right-hand sides iterated together: a product with so many reads the matrix once for all.
-COLUMNS_AT_ONCE = 24
 # A residual this small against the matrix times the solution is round-off: no solver gets below.
 ROUND_OFF = 16.0 * np.finfo(float).eps
 
@@ -106,9 +104,10 @@ def with_lumped_nodes(system: ThermalSystem, cycle: Operator) -> Operator:
     exchange, factor = system.exchange, cho_factor(system.lumped_matrix)
 
     def apply(residual: NDArray[np.float64]) -> NDArray[np.float64]:
-        condensed = residual[:n] + exchange @ cho_solve(factor, residual[n:])
+        condensed = residual[:n] + (exchange @ cho_solve(factor, residual[n:])).astype(residual.dtype)
         unknowns = cycle(condensed)
-        return np.concatenate((unknowns, cho_solve(factor, residual[n:] + exchange.T @ unknowns)))
+        lumped = cho_solve(factor, residual[n:] + exchange.T @ unknowns)
+        return np.concatenate((unknowns, lumped.astype(residual.dtype)))
 
     return apply
 
@@ -219,104 +218,6 @@ def solve_linear(
         restarts += 1
         residual = load - multiply(matrix, unknowns)
     return LinearSolution(unknowns, iterations, norm / scale if scale else 0.0)
-
-
-def solve_many(
-    matrix: sparse.csr_array,
-    loads: NDArray[np.float64],
-    preconditioner: Preconditioner,
-    guesses: NDArray[np.float64] | None = None,
-    *,
-    relative_tolerance: float,
-    max_iterations: int = MAX_ITERATIONS,
-) -> NDArray[np.float64]:
-    """Several right-hand sides at once by conjugate gradients, each on its own.
-
-    The iterations share only the products: sparse ones with 24 columns take
-    some six times as long as with one. A column ends when its error in the
-    energy norm, estimated as ``√(rᵀ B r)`` with the preconditioner B, is a
-    given share of the norm of its solution.
-
-    Parameters
-    ----------
-    matrix : (n, n) csr_array
-        Symmetric positive definite.
-    loads : (n, m) ndarray
-    preconditioner : Preconditioner
-        Of this matrix or of a similar one.
-    guesses : (n, m) ndarray, optional
-        Galerkin solutions in some space (their energy is taken for their
-        share of the solution's).
-    relative_tolerance : float, [-]
-
-    Returns
-    -------
-    (n, m) ndarray
-
-    Raises
-    ------
-    ConvergenceError
-        The tolerance was not reached.
-    """
-    solved = np.zeros_like(loads) if guesses is None else np.array(guesses, dtype=float)
-    for first in range(0, loads.shape[1], COLUMNS_AT_ONCE):
-        own = slice(first, first + COLUMNS_AT_ONCE)
-        block = np.ascontiguousarray(solved[:, own])
-        residual = loads[:, own] - matrix @ block
-        known = np.abs(_dots(loads[:, own], block))
-        solved[:, own] = block + _columnwise_gradients(
-            matrix, residual, preconditioner.apply, known, relative_tolerance, max_iterations
-        )
-    return solved
-
-
-def _dots(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.einsum("nm,nm->m", first, second)
-
-
-def _columnwise_gradients(
-    matrix: sparse.csr_array,
-    residual: NDArray[np.float64],
-    precondition: Operator,
-    known: NDArray[np.float64],
-    tolerance: float,
-    limit: int,
-) -> NDArray[np.float64]:
-    """Corrections of all columns; those that have converged leave the iteration."""
-    corrections = np.zeros_like(residual)
-    active = np.arange(residual.shape[1])
-    unknowns = np.zeros_like(residual)
-    direction = precondition(residual)
-    energy = _dots(residual, direction)
-    target = tolerance**2 * (known + energy)
-    for _ in range(limit + 1):
-        going = energy > target
-        if not going.all():
-            corrections[:, active] = unknowns
-            if not going.any():
-                return corrections
-            active, energy, target = active[going], energy[going], target[going]
-            residual, direction, unknowns = (
-                np.ascontiguousarray(item[:, going]) for item in (residual, direction, unknowns)
-            )
-        image = matrix @ direction
-        curvature = _dots(direction, image)
-        if not np.all(curvature > 0.0):
-            raise ConvergenceError(
-                "linear solver", f"the matrix is not positive definite ({curvature.min():.3g})."
-            )
-        step = energy / curvature
-        unknowns += step * direction
-        residual -= step * image
-        preconditioned = precondition(residual)
-        direction *= -step * _dots(preconditioned, image) / energy
-        direction += preconditioned
-        energy = _dots(residual, preconditioned)
-    raise ConvergenceError(
-        "linear solver",
-        f"error {tolerance * np.sqrt((energy / target).max()):.1e} of the solution after {limit} iterations.",
-        f"Asked: {tolerance:.1e}. Allow more iterations.",
-    )
 
 
 def _to_error(

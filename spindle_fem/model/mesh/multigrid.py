@@ -26,6 +26,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from spindle_fem.errors import SpecError
 from spindle_fem.model.mesh.huge_pages import room
+from spindle_fem.model.mesh.kernels import column_loops as many
 from spindle_fem.model.mesh.kernels import multigrid_loops as loops
 from spindle_fem.model.mesh.kernels import team_loops as teams
 from spindle_fem.model.mesh.threads import (
@@ -121,23 +122,30 @@ class Hierarchy:
     plan: CyclePlan | None
     # vectors of all levels, for the next cycle: fresh memory would be touched anew in each
     _spare: list[NDArray] = field(default_factory=list)
+    _spare_columns: list[dict[tuple[int, str], NDArray]] = field(default_factory=list)
 
     def cycle(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
         """One V-cycle: approximate solution of ``K x = residual``.
 
         Parameters
         ----------
-        residual : (n,) or (n, m) float64 ndarray
+        residual : (n,) or (n, m) ndarray
             Several columns cost far less than one after the other: each matrix
-            is read once for all of them.
+            is read once for all of them. They may be of single precision, as
+            the answer then is.
         """
         if self.plan is None:
             return cho_solve(self.coarsest, residual)
         # scaled, so that small residuals stay inside the range of single precision
         if residual.ndim == 2:
-            scales = np.abs(residual).max(axis=0, initial=0.0)
+            scales = np.maximum(residual.max(axis=0, initial=0.0), -residual.min(axis=0, initial=0.0))
             scales[scales == 0.0] = 1.0
-            return scales * self._descend_many(0, (residual / scales).astype(PRECISION, order="C"))
+            spare = self._spare_columns.pop() if self._spare_columns else {}
+            right = _columns(spare, (0, "r"), residual.shape)
+            np.multiply(residual, 1.0 / scales, out=right, casting="same_kind")
+            answer = scales.astype(residual.dtype) * self._descend_many(0, right, spare)
+            self._spare_columns.append(spare)
+            return answer
         scale = float(np.linalg.norm(residual)) / np.sqrt(len(residual)) or 1.0
         plan = self.plan
         # calls from several threads find vectors of their own
@@ -150,30 +158,36 @@ class Hierarchy:
         self._spare.append(work)
         return answer
 
-    def _descend_many(self, depth: int, right: NDArray) -> NDArray:
-        """The cycle for several columns, from a level on."""
+    def _descend_many(self, depth: int, right: NDArray, spare: dict[tuple[int, str], NDArray]) -> NDArray:
+        """The cycle for several columns, from a level on; what it returns is memory of ``spare``."""
         if depth == len(self.levels):
             return cho_solve(self.coarsest, right.astype(np.float64)).astype(PRECISION)
-        level = self.levels[depth]
+        level, shape = self.levels[depth], right.shape
         blocks = row_blocks(len(right))
-        left, following = np.empty_like(right), np.empty_like(right)
-        direction = right * (teams.FIRST_STEP * level.inverse[:, None])
-        unknowns = teams.FIRST_WEIGHT * direction
-        smooth = (loops.smooth_many, blocks, *level.matrix, level.inverse)
-        run_blocks(*smooth, right, direction, teams.KEEP, teams.SECOND_STEP, left, following)
-        unknowns += teams.SECOND_WEIGHT * following
-        run_blocks(*smooth, right, unknowns, teams.NOTHING, teams.FIRST_STEP, left, direction)
-        coarse = np.empty((len(level.restriction[0]) - 1, right.shape[1]), dtype=PRECISION)
+        left, direction, unknowns = (_columns(spare, (depth, name), shape) for name in "ldu")
+        smooth = (many.smooth_columns, blocks, *level.matrix, level.inverse)
+        weights = (teams.KEEP, teams.SECOND_STEP, teams.FIRST_WEIGHT, teams.SECOND_WEIGHT)
+        run_blocks(many.scale_rows, blocks, teams.FIRST_STEP, level.inverse, right, direction)
+        run_blocks(*smooth, right, direction, *weights, False, unknowns)
+        run_blocks(many.left_over, blocks, *level.matrix, right, unknowns, left)
+        coarse = _columns(spare, (depth, "c"), (len(level.restriction[0]) - 1, shape[1]))
         # rows of the restriction are long
         coarse_blocks = np.linspace(0, len(coarse), len(blocks)).astype(np.int64)
-        run_blocks(loops.multiply_many, coarse_blocks, *level.restriction, left, coarse)
-        correction = np.ascontiguousarray(self._descend_many(depth + 1, coarse))
-        run_blocks(loops.add_prolonged_many, blocks, *level.prolongation, correction, unknowns)
-        run_blocks(*smooth, right, unknowns, teams.NOTHING, teams.FIRST_STEP, left, direction)
-        unknowns += teams.FIRST_WEIGHT * direction
-        run_blocks(*smooth, left, direction, teams.KEEP, teams.SECOND_STEP, right, following)
-        unknowns += teams.SECOND_WEIGHT * following
+        run_blocks(many.multiply_columns, coarse_blocks, *level.restriction, left, coarse)
+        correction = self._descend_many(depth + 1, coarse, spare)
+        run_blocks(many.add_prolonged_columns, blocks, *level.prolongation, correction, unknowns)
+        run_blocks(many.left_over, blocks, *level.matrix, right, unknowns, left)
+        run_blocks(many.scale_rows, blocks, teams.FIRST_STEP, level.inverse, left, direction)
+        run_blocks(*smooth, left, direction, *weights, True, unknowns)
         return unknowns
+
+
+def _columns(spare: dict[tuple[int, str], NDArray], key: tuple[int, str], shape: tuple[int, ...]) -> NDArray:
+    """Memory for columns of a level that the next cycle takes again."""
+    size = shape[0] * shape[1]
+    if key not in spare or spare[key].size < size:
+        spare[key] = room(size, PRECISION)
+    return spare[key][:size].reshape(shape)
 
 
 def build_hierarchy(matrix: sparse.csr_array, prolongation: sparse.csr_array | None) -> Hierarchy:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -253,17 +253,19 @@ class ThermalOperators:
         )
         return (jump.T @ blocks @ jump).tocsr()
 
-    def part_conduction(self, part: str) -> sparse.csr_array:
-        """Conduction matrix of one part with unit conductivity, [m]."""
-        return self._of_part(part, self.conduction)
+    def parts_conduction(self, parts: Sequence[str]) -> sparse.csr_array:
+        """Conduction matrix of some parts with unit conductivity, [m]."""
+        return self._of_parts(parts, self.conduction)
 
-    def part_storage(self, part: str) -> sparse.csr_array:
-        """Storage matrix of one part with unit volumetric capacity, [m³]."""
-        return self._of_part(part, self.storage)
+    def parts_storage(self, parts: Sequence[str]) -> sparse.csr_array:
+        """Storage matrix of some parts with unit volumetric capacity, [m³]."""
+        return self._of_parts(parts, self.storage)
 
-    def _of_part(self, part: str, unit: NDArray[np.float64]) -> sparse.csr_array:
-        upper = np.where(self.part_of_slot == self.part_index(part, "part"), unit, 0.0)
-        matrix = self.matrix(upper).copy()
+    def _of_parts(self, parts: Sequence[str], unit: NDArray[np.float64]) -> sparse.csr_array:
+        factors = np.zeros(len(self.mesh.part_names))
+        factors[[self.part_index(part, "part") for part in parts]] = 1.0
+        # a copy, whose zeros go
+        matrix = self.matrix(self._scaled(unit, factors)).copy()
         matrix.eliminate_zeros()
         return matrix
 

@@ -13,13 +13,10 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.machine.view.place_names import ACROSS, AROUND, NEAR, UP
+from spindle_fem.model.reduced.growing_projection import GrowingProjection, in_solving_order
 from spindle_fem.model.reduced.mesh_model import MeshModel, build_mesh_model
-from spindle_fem.model.reduced.reduced_cache import family_of, reduced_digest, reduced_path
-from spindle_fem.model.reduced.snapshots import (
-    Sample,
-    SnapshotSpace,
-    shifted_systems,
-)
+from spindle_fem.model.reduced.reduced_cache import KeptBasis, family_of, reduced_digest, reduced_path
+from spindle_fem.model.reduced.snapshots import Sample
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.reduced.unit_loads import coolant_loads, fluid_loads, friction_loads
 from spindle_fem.model.thermal_model import ThermalModel, project
@@ -79,15 +76,28 @@ class ReductionOptions:
         return max(spec.operation.speed, table.speed[-1] if table is not None else 0.0)
 
 
+@dataclass(frozen=True, slots=True)
+class Reduction:
+    """A reduced model, and the fields on the mesh, (n, r), that its unknowns stand for."""
+
+    model: ThermalModel
+    fields: NDArray[np.float32]
+
+
 # Laplace frequencies, 1/s: steady state, hours, minutes, half a minute.
 SHIFTS = (0.0, 3.0e-4, 3.0e-3)
 FAST_SHIFT = 3.0e-2
 # Heat of one place that a diagnosis may find a source in, W.
 PLACE_HEAT = 50.0
-# Basis vectors from which first guesses are combined.
-GUESS_SIZE = 80
+# Of a solution that a basis is made from, as a share of the largest that occurs, in the energy norm: what a
+# projection makes of it at a probe is of second order in it.
+SOLUTION_ERROR = 1.0e-3
 # To this share an error is itself worked out.
-CHECK_TOLERANCE = 0.05
+CHECK_TOLERANCE = 0.02
+# The same where another machine's basis is tried, which rarely comes near what is allowed.
+CHECK_OF_NEAR = 0.1
+# Rounds of checks in which such a basis grows; then it gets snapshots as any.
+ROUNDS_OF_NEAR = 2
 # Steps of the series in the change of one contact that the basis holds, and the share of its conductance
 # that is left where all contacts of a group have opened.
 CONTACT_ORDERS, OPENED = 2, 0.05
@@ -195,9 +205,21 @@ def reduced_model_of(
         if found is not None and _holds(found, spec, chosen.highest_speed_of(spec)):
             return found
     machine = prepare_machine(spec, progress=progress)
-    model = build_reduced_model(machine, chosen, progress=progress)
-    model.save(reduced_path(digest))
-    return model
+    near = _nearest(digest, machine)
+    built = build_reduced_model(machine, chosen, near=near, progress=progress)
+    built.model.save(reduced_path(digest))
+    if near is None or built.fields is not near.fields:
+        KeptBasis(machine.mesh.digest, built.fields).save(digest)
+    return built.model
+
+
+def _nearest(digest: str, machine: PreparedMachine) -> Reduction | None:
+    """The smallest reduction of another machine of the family on the same mesh; None where none is kept."""
+    for path in sorted(family_of(digest), key=lambda path: path.stat().st_size):
+        model, basis = ThermalModel.load(path), KeptBasis.beside(path)
+        if model is not None and basis is not None and basis.mesh == machine.mesh.digest:
+            return Reduction(model, basis.fields)
+    return None
 
 
 def _holds(model: ThermalModel, spec: MachineSpec, highest_speed: float) -> bool:
@@ -214,71 +236,88 @@ def build_reduced_model(
     machine: PreparedMachine,
     options: ReductionOptions | None = None,
     *,
+    near: Reduction | None = None,
     progress: Progress = lambda stage: None,
-) -> ThermalModel:
+) -> Reduction:
     """Project a prepared machine and check the projection against the full model.
 
     Snapshots are full solutions at several Laplace frequencies (moment
     matching, rational Krylov) for every source and fluid at the nominal
     coefficients, and for the physical loads at coefficients drawn over the
-    range, each begun from the projection on those before; their proper
-    orthogonal decomposition in the energy of the nominal operator is the
+    range; only what the projection on those before misses is solved for. Their
+    proper orthogonal decomposition in the energy of the nominal operator is the
     basis. The check corrects projected solutions at other coefficients by the
     full model; where they err by more than ``options.error``, the full
-    solutions join the snapshots.
+    solutions join.
+
+    Parameters
+    ----------
+    near : Reduction, optional
+        Of a machine on the same mesh with other coefficients: its basis takes the place of the
+        snapshots, and what two rounds of checks ask for is added to it.
 
     Raises
     ------
     ConvergenceError
-        The checks still err after three rounds.
+        The checks still err after three rounds with snapshots.
     """
     chosen = options or ReductionOptions()
     spec = machine.spec
     progress("reduced model: operators")
-    full = build_mesh_model(machine)
+    full = in_solving_order(build_mesh_model(machine))
     table = build_coefficient_table(spec, full.contacts, full.gap_radii)
     sampler = _Sampler(machine, full, table, free_parameters(spec), chosen)
     nominal = sampler.sample({}, sampler.usual_speed)
-    progress("reduced model: snapshots")
-    energy = (
-        full.conduction(nominal.coefficients, nominal.channel_film) + 1e-4 * full.capacity(nominal.capacities)
-    ).tocsr()
-    space = SnapshotSpace(energy, full.one[:, None], chosen.tolerance)
-    _add_nominal(space, full, nominal, spec)
-    opened = [sampler.sample({f"joint.{group.name}": OPENED}, sampler.usual_speed) for group in spec.joint]
-    for sample in (*opened, *sampler.random_samples(chosen.samples, 1, chosen.sigmas)):
-        # Fields at other coefficients begin as the best combination of those known.
-        known = space.basis(GUESS_SIZE)
-        loads = physical_loads(full, sample, spec)
-        systems = shifted_systems(full, sample, SHIFTS, known)
-        space.add(np.hstack([system.solve(loads) for system in systems]))
+    grown = GrowingProjection(full, nominal, None if near is None else (near.fields, near.model))
+    wanted = SOLUTION_ERROR * grown.size_of(nominal, physical_loads(full, nominal, spec))
+    if near is None:
+        progress("reduced model: snapshots")
+        _add_snapshots(grown, sampler, nominal, wanted)
     seed = 2
-    for attempt in range(3):
+    for attempt in range(3 if near is None else 3 + ROUNDS_OF_NEAR):
+        if near is not None and attempt == ROUNDS_OF_NEAR:
+            progress("reduced model: snapshots")
+            _add_snapshots(grown, sampler, nominal, wanted)
+            near = None
         progress("reduced model: basis")
-        basis = space.basis(chosen.largest + 30 * attempt)
-        model = replace(
-            project(full, basis, basis.T @ (energy @ full.one)),
-            ranges=sampler.ranges(),
-            digest=reduced_digest(spec, chosen.key(spec)),
-        )
+        if near is None:
+            basis = grown.leading(chosen.largest + 30 * attempt, chosen.tolerance)
+        else:
+            basis = np.eye(grown.size)
         progress("reduced model: check")
-        worst: dict[str, float] = {}
+        share = CHECK_TOLERANCE if near is None else CHECK_OF_NEAR
+        worst = {"probes": 0.0, "places": 0.0}
         # Solutions that have joined can no longer judge: every round draws others.
         for sample in sampler.random_samples(chosen.checks, seed, 0.9 * chosen.sigmas):
-            found = _check(full, basis, sample, spec)
-            worst = {key: max(value, worst.get(key, 0.0)) for key, value in found.errors.items()}
-            if found.errors["probes"] > chosen.error:
-                for solution in found.solutions:
-                    space.add(solution)
+            loads = physical_loads(full, sample, spec)
+            missing = np.hstack(grown.missing(sample, loads, SHIFTS, basis, share))
+            errors = {"probes": _largest(full.probes @ missing), "places": _largest(full.places @ missing)}
+            worst = {key: max(value, errors[key]) for key, value in worst.items()}
+            if errors["probes"] > chosen.error:
+                grown.enrich(sample, loads, SHIFTS, wanted)
         seed += 100
-        model = replace(model, errors=worst)
         if worst["probes"] <= chosen.error:
-            return model
+            own = {"digest": reduced_digest(spec, chosen.key(spec)), "ranges": sampler.ranges()}
+            if near is not None and len(basis) == near.model.size:
+                return Reduction(replace(near.model, errors=worst, **own), near.fields)
+            fields = grown.fields(basis)
+            one = np.eye(1, basis.shape[1])[0]
+            # The matrices of the mesh in double precision: what was worked out on the way is right to 1e-6.
+            return Reduction(replace(project(full, fields.astype(float), one), errors=worst, **own), fields)
     raise ConvergenceError(
         "reduced model",
-        f"its probes still err by {worst['probes']:.3g} K with {model.size} basis vectors.",
+        f"its probes still err by {worst['probes']:.3g} K with {basis.shape[1]} basis vectors.",
         f"Asked: {chosen.error:g} K. Allow more basis vectors or a larger error.",
     )
+
+
+def _add_snapshots(grown: GrowingProjection, sampler: _Sampler, nominal: Sample, wanted: float) -> None:
+    """Sources one by one at the nominal coefficients, then physical loads over the range."""
+    spec, chosen = sampler.machine.spec, sampler.options
+    _add_nominal(grown, nominal, spec, wanted)
+    opened = [sampler.sample({f"joint.{group.name}": OPENED}, sampler.usual_speed) for group in spec.joint]
+    for sample in (*opened, *sampler.random_samples(chosen.samples, 1, chosen.sigmas)):
+        grown.enrich(sample, physical_loads(grown.full, sample, spec), SHIFTS, wanted)
 
 
 def _source_places(full: MeshModel, spec: MachineSpec) -> list[str]:
@@ -294,8 +333,9 @@ def _source_places(full: MeshModel, spec: MachineSpec) -> list[str]:
     return list(dict.fromkeys((*other, *(source.place for source in spec.source))))
 
 
-def _add_nominal(space: SnapshotSpace, full: MeshModel, nominal: Sample, spec: MachineSpec) -> None:
+def _add_nominal(grown: GrowingProjection, nominal: Sample, spec: MachineSpec, wanted: float) -> None:
     """Every source and fluid by itself at the nominal coefficients."""
+    full = grown.full
     heat = friction_loads(
         full, [[bearing.name] for _, bearing in spec.bearings], ("inner_raceway", "outer_raceway", "balls")
     )
@@ -307,35 +347,36 @@ def _add_nominal(space: SnapshotSpace, full: MeshModel, nominal: Sample, spec: M
             coolant_loads(full, nominal.channel_film, 5),
         )
     )
-    known = None
-    for shift in (*SHIFTS, FAST_SHIFT):
-        [system] = shifted_systems(full, nominal, [shift], known)
-        space.add(system.solve(heat if shift == FAST_SHIFT else loads))
-        known = space.basis(GUESS_SIZE)
-    _add_contacts(space, full, nominal, spec)
+    for shift in SHIFTS:
+        grown.enrich(nominal, loads, [shift], wanted)
+    grown.enrich(nominal, heat, [FAST_SHIFT], wanted)
+    _add_contacts(grown, nominal, spec, wanted)
 
 
-def _add_contacts(space: SnapshotSpace, full: MeshModel, nominal: Sample, spec: MachineSpec) -> None:
+def _add_contacts(grown: GrowingProjection, nominal: Sample, spec: MachineSpec, wanted: float) -> None:
     """Add the effect of each single contact, at the nominal coefficients.
 
     The uncertain parameters move the contacts of a set together: no other solution contains the field beside
     one seat that is worse than the others. ``K⁻¹ g J u``, and the same of that, are the first terms of
     the series in a share of one conductance g with the operator J.
     """
+    full = grown.full
     contacts = [
         nominal.coefficients[name] * operator
         for name, operator in zip(full.coefficient_names, full.operators, strict=True)
         if name.startswith("joint.")
     ]
     loads = physical_loads(full, nominal, spec)
-    for system in shifted_systems(full, nominal, SHIFTS, space.basis(GUESS_SIZE)):
-        fields = system.solve(loads)
+    for shift in SHIFTS:
+        [solved] = grown.enrich(nominal, loads, [shift], wanted).coordinates
+        fields = grown.fields(solved)
         # All loads press heat through a contact almost alike: the largest combination represents them.
         columns = [_largest_combination(contact @ fields) for contact in contacts]
-        for _ in range(CONTACT_ORDERS):
-            changes = system.solve(np.column_stack(columns))
-            space.add(changes)
-            columns = [contact @ change for contact, change in zip(contacts, changes.T, strict=True)]
+        for order in range(CONTACT_ORDERS):
+            [solved] = grown.enrich(nominal, np.column_stack(columns), [shift], wanted).coordinates
+            if order + 1 < CONTACT_ORDERS:
+                changes = grown.fields(solved)
+                columns = [contact @ change for contact, change in zip(contacts, changes.T, strict=True)]
 
 
 def _largest_combination(columns: Array) -> Array:
@@ -354,36 +395,6 @@ def physical_loads(full: MeshModel, sample: Sample, spec: MachineSpec) -> Array:
             coolant_loads(full, sample.channel_film, 1),
         )
     )
-
-
-@dataclass(frozen=True, slots=True)
-class _Check:
-    """A basis against the full model at one sample.
-
-    Attributes
-    ----------
-    errors : mapping of str to float, [K]
-        Largest over loads and frequencies, by what was compared.
-    solutions : tuple of (n, m) ndarray
-        Of the full model.
-    """
-
-    errors: dict[str, float]
-    solutions: tuple[Array, ...]
-
-
-def _check(full: MeshModel, basis: Array, sample: Sample, spec: MachineSpec) -> _Check:
-    """Correct the projected solutions by the full model; the corrections are the errors."""
-    loads = physical_loads(full, sample, spec)
-    worst = {"probes": 0.0, "places": 0.0}
-    solutions = []
-    for system in shifted_systems(full, sample, SHIFTS, basis):
-        projected = basis @ np.linalg.solve(system.projected, basis.T @ loads)
-        missing = system.correct(loads, projected, CHECK_TOLERANCE)
-        worst["probes"] = max(worst["probes"], _largest(full.probes @ missing))
-        worst["places"] = max(worst["places"], _largest(full.places @ missing))
-        solutions.append(projected + missing)
-    return _Check(worst, tuple(solutions))
 
 
 def _largest(values: Array) -> float:

@@ -129,8 +129,8 @@ def _conduction(
     found: dict[str, sparse.csr_array] = {}
     materials = _materials(spec, operators.mesh.part_names)
     for material in dict.fromkeys(materials.values()):
-        own = [operators.part_conduction(part) for part, kind in materials.items() if kind == material]
-        found[f"conductivity.{material}"] = _padded(sum(own[1:], own[0]), size)
+        own = [part for part, kind in materials.items() if kind == material]
+        found[f"conductivity.{material}"] = _padded(operators.parts_conduction(own), size)
     for contact in operators.mesh.joints:
         found[f"joint.{contact}"] = _padded(operators.joint_matrix(contact), size)
     for film in spec.film:
@@ -252,10 +252,10 @@ def _storage(machine: PreparedMachine, lumped: tuple[str, ...], size: int) -> di
     """Unit capacity of every material and ball row."""
     spec, operators = machine.spec, machine.operators
     found: dict[str, sparse.csr_array] = {}
-    for part, material in _materials(spec, operators.mesh.part_names).items():
-        matrix = _padded(operators.part_storage(part), size)
-        key = f"capacity.{material}"
-        found[key] = found[key] + matrix if key in found else matrix
+    materials = _materials(spec, operators.mesh.part_names)
+    for material in dict.fromkeys(materials.values()):
+        own = [part for part, kind in materials.items() if kind == material]
+        found[f"capacity.{material}"] = _padded(operators.parts_storage(own), size)
     for _, bearing in spec.bearings:
         nodes = [operators.n_unknowns + lumped.index(n) for n in machine.builder.ball_nodes(bearing.name)]
         share = np.full(len(nodes), 1.0 / len(nodes))

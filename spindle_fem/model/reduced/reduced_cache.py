@@ -5,12 +5,50 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.cache import cache_directory, source_digest
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.cache import cache_directory, load_record, save_record, source_digest
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.model.thermal_model import FORMAT
+
+# What of a material is a live coefficient.
+MATERIAL_COEFFICIENTS = ("thermal_conductivity", "density", "specific_heat_capacity")
+BASIS_FORMAT = "spindle-fem/reduced-basis/1"
+
+
+@dataclass(frozen=True, slots=True)
+class KeptBasis:
+    """Fields on a mesh that a reduced model is a projection on: another machine of the family begins there.
+
+    Attributes
+    ----------
+    mesh : str
+        Digest of the mesh.
+    fields : (n, r) float32 ndarray
+        Unknowns in the order of :func:`in_solving_order`.
+    """
+
+    mesh: str
+    fields: NDArray[np.float32]
+
+    def save(self, digest: str) -> None:
+        """Keep it beside the reduced model of a digest."""
+        save_record(self, _basis_path(reduced_path(digest)), BASIS_FORMAT)
+
+    @classmethod
+    def beside(cls, path: Path) -> KeptBasis | None:
+        """What is kept beside a reduced model; None where nothing is."""
+        found = load_record(_basis_path(path), BASIS_FORMAT, cls)
+        return None if found is None else cls(**found)
+
+
+def _basis_path(path: Path) -> Path:
+    return path.with_name(path.name.replace("reduced-", "basis-", 1))
 
 
 def reduced_digest(spec: MachineSpec, options: Mapping[str, float]) -> str:
@@ -39,7 +77,16 @@ def _content(spec: MachineSpec) -> dict[str, Any]:
         content.pop(key, None)
     # Heat sources count only by their place: the basis holds the fields of these places.
     content["source"] = sorted({source.place for source in spec.source})
-    return _without_tolerances(content)
+    return _without_tolerances(_without_marks(content))
+
+
+def _without_marks(content: Any) -> Any:
+    """The same without where each value is from: ``--set`` marks what it sets, which changes nothing."""
+    if isinstance(content, dict):
+        return {key: _without_marks(item) for key, item in content.items() if key != "marks"}
+    if isinstance(content, (list, tuple)):
+        return [_without_marks(item) for item in content]
+    return content
 
 
 def _without_tolerances(content: Any) -> Any:
@@ -57,6 +104,10 @@ def _without_coefficients(content: Mapping[str, Any]) -> dict[str, Any]:
     """A definition without what the reduced model has as live coefficients, and without heat."""
     rest = {key: value for key, value in content.items() if key not in ("factor", "heat", "grease")}
     rest["heat_capacity_factor"] = rest["coolant"] = None
+    rest["materials"] = {
+        name: {key: item for key, item in own.items() if key not in MATERIAL_COEFFICIENTS}
+        for name, own in content["materials"].items()
+    }
     rest["joint"] = [
         item | {"conductance": "perfect" if item.get("conductance") == "perfect" else None}
         for item in content["joint"]

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import eigh
 
-from spindle_fem.model.mesh.linear_solvers import build_preconditioner, solve_many
+from spindle_fem.model.mesh.column_solver import solve_many
+from spindle_fem.model.mesh.linear_solvers import build_preconditioner
 from spindle_fem.model.reduced.mesh_model import MeshModel
 
 Array = NDArray[np.float64]

@@ -158,25 +158,29 @@ def sensitivity_forcing(
     # Defects of both halves of the step; all parameters that enter share the products with the inverses.
     entering = [i for i, change in enumerate(changes) if change.enters]
     entered = [changes[i] for i in entering]
-    first = np.zeros((len(entered), *before.shape))
+    n, size = before.shape
+    first = np.zeros((n, len(entered), size))
     second = np.zeros_like(first)
     by_conduction = [i for i, change in enumerate(entered) if change.conduction is not None]
     if by_conduction:
-        matrices = np.stack([entered[i].conduction.T for i in by_conduction])
-        first[by_conduction] -= weight * ((before + stage) @ matrices)
-        second[by_conduction] -= weight * (after @ matrices)
-    for own_first, own_second, change in zip(first, second, entered, strict=True):
+        # All matrices beside each other: two wide products give what every parameter does in every step.
+        wide = np.stack([entered[i].conduction.T for i in by_conduction], axis=1).reshape(size, -1)
+        first[:, by_conduction] = (-weight * (before + stage) @ wide).reshape(n, -1, size)
+        second[:, by_conduction] = (-weight * after @ wide).reshape(n, -1, size)
+    for i, change in enumerate(entered):
         if change.storage is not None:
-            own_first += (before - stage) @ change.storage.T
-            own_second += (STAGE_WEIGHT * stage - START_WEIGHT * before - after) @ change.storage.T
+            first[:, i] += (before - stage) @ change.storage.T
+            second[:, i] += (STAGE_WEIGHT * stage - START_WEIGHT * before - after) @ change.storage.T
         if change.load_start is not None:
-            own_first += weight * ((2.0 - GAMMA) * change.load_start + GAMMA * change.load_end)
-            own_second += weight * change.load_end
-    size = before.shape[1]
+            first[:, i] += weight * ((2.0 - GAMMA) * change.load_start + GAMMA * change.load_end)
+            second[:, i] += weight * change.load_end
     moved = first.reshape(-1, size) @ propagator.carried.T
     moved += second.reshape(-1, size) @ propagator.inverse.T
-    found = np.zeros((*before.shape, len(changes)))
-    found[:, :, entering] = moved.reshape(first.shape).transpose(1, 2, 0)
+    columns = moved.reshape(first.shape).transpose(0, 2, 1)
+    if len(entering) == len(changes):
+        return np.ascontiguousarray(columns)
+    found = np.zeros((n, size, len(changes)))
+    found[:, :, entering] = columns
     return found
 
 

@@ -43,46 +43,6 @@ def add_prolonged(low, high, columns, values, vector, out):
         out[i] += total
 
 
-# Versions for several columns (n, m) at once: each entry of the matrix is read once for all.
-@njit(**FAST)
-def multiply_many(low, high, starts, columns, values, vectors, out):
-    """``out = A vectors`` on a range of rows."""
-    m = out.shape[1]
-    for i in range(low, high):
-        for c in range(m):
-            out[i, c] = 0.0
-        for place in range(starts[i], starts[i + 1]):
-            j, value = columns[place], values[place]
-            for c in range(m):
-                out[i, c] += value * vectors[j, c]
-
-
-@njit(**FAST)
-def smooth_many(low, high, starts, columns, values, inverse, right, vectors, keep, add, left, following):
-    """Apply :func:`smooth` to several columns."""
-    m = right.shape[1]
-    for i in range(low, high):
-        for c in range(m):
-            left[i, c] = right[i, c]
-        for place in range(starts[i], starts[i + 1]):
-            j, value = columns[place], values[place]
-            for c in range(m):
-                left[i, c] -= value * vectors[j, c]
-        factor = add * inverse[i]
-        for c in range(m):
-            following[i, c] = keep * vectors[i, c] + factor * left[i, c]
-
-
-@njit(**FAST)
-def add_prolonged_many(low, high, columns, values, vectors, out):
-    """Apply :func:`add_prolonged` to several columns."""
-    for i in range(low, high):
-        for k in range(WIDTH):
-            j, value = columns[i, k], values[i, k]
-            for c in range(out.shape[1]):
-                out[i, c] += value * vectors[j, c]
-
-
 # -------------------------------------------------------- smoothed aggregation
 @njit(**OPTIONS)
 def aggregate(indptr, indices, data):

@@ -1,0 +1,109 @@
+"""Kernels for several columns (n, m) at once: each entry of a matrix is read once for all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from spindle_fem.model.mesh.kernels import FAST
+from spindle_fem.model.mesh.kernels.multigrid_loops import WIDTH
+
+
+@njit(**FAST)
+def multiply_columns(low, high, starts, columns, values, vectors, out):
+    """``out = A vectors`` on a range of rows."""
+    m = out.shape[1]
+    for i in range(low, high):
+        for c in range(m):
+            out[i, c] = 0.0
+        for place in range(starts[i], starts[i + 1]):
+            j, value = columns[place], values[place]
+            for c in range(m):
+                out[i, c] += value * vectors[j, c]
+
+
+@njit(**FAST)
+def left_over(low, high, starts, columns, values, right, vectors, out):
+    """``out = right − A vectors`` on a range of rows."""
+    m = out.shape[1]
+    for i in range(low, high):
+        for c in range(m):
+            out[i, c] = right[i, c]
+        for place in range(starts[i], starts[i + 1]):
+            j, value = columns[place], values[place]
+            for c in range(m):
+                out[i, c] -= value * vectors[j, c]
+
+
+@njit(**FAST)
+def smooth_columns(
+    low, high, starts, columns, values, inverse, right, direction, keep, add, first, second, begun, unknowns
+):
+    """Both steps of the polynomial, ``direction`` d the first: ``x = begun x + first d + second d₂``.
+
+    ``d₂ = keep d + add D⁻¹ (right − A d)`` is kept nowhere.
+    """
+    m = right.shape[1]
+    sums = np.empty(m, dtype=right.dtype)
+    for i in range(low, high):
+        for c in range(m):
+            sums[c] = right[i, c]
+        for place in range(starts[i], starts[i + 1]):
+            j, value = columns[place], values[place]
+            for c in range(m):
+                sums[c] -= value * direction[j, c]
+        of_direction, of_sum = first + second * keep, second * add * inverse[i]
+        if begun:
+            for c in range(m):
+                unknowns[i, c] += of_direction * direction[i, c] + of_sum * sums[c]
+        else:
+            for c in range(m):
+                unknowns[i, c] = of_direction * direction[i, c] + of_sum * sums[c]
+
+
+@njit(**FAST)
+def scale_rows(low, high, factor, inverse, right, out):
+    """``out = factor D⁻¹ right``."""
+    for i in range(low, high):
+        scale = factor * inverse[i]
+        for c in range(right.shape[1]):
+            out[i, c] = scale * right[i, c]
+
+
+@njit(**FAST)
+def add_prolonged_columns(low, high, columns, values, vectors, out):
+    """``out += P vectors`` with as many entries in every row, (n, WIDTH)."""
+    for i in range(low, high):
+        for k in range(WIDTH):
+            j, value = columns[i, k], values[i, k]
+            for c in range(out.shape[1]):
+                out[i, c] += value * vectors[j, c]
+
+
+# ------------------------------------------------------- conjugate gradients
+@njit(**FAST)
+def dot_columns(low, high, one, two):
+    """Scalar product of each pair of columns over a range of rows, (m,), in double precision."""
+    m = one.shape[1]
+    sums = np.zeros(m)
+    for i in range(low, high):
+        for c in range(m):
+            sums[c] += np.float64(one[i, c]) * np.float64(two[i, c])
+    return sums
+
+
+@njit(**FAST)
+def advance_columns(low, high, step, direction, image, unknowns, residual):
+    """Go one step along each direction."""
+    for i in range(low, high):
+        for c in range(direction.shape[1]):
+            unknowns[i, c] += step[c] * direction[i, c]
+            residual[i, c] -= step[c] * image[i, c]
+
+
+@njit(**FAST)
+def turn_columns(low, high, factor, preconditioned, direction):
+    """``direction = factor direction + preconditioned``."""
+    for i in range(low, high):
+        for c in range(direction.shape[1]):
+            direction[i, c] = factor[c] * direction[i, c] + preconditioned[i, c]
