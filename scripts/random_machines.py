@@ -21,7 +21,13 @@ import tomli_w
 import spindle_fem
 from spindle_fem.commands.checked_machine import load_buildable
 from spindle_fem.definition.bearing_catalogue import boundary_dimensions, catalogue_bearing
-from spindle_fem.errors import BadInputError, NoEquilibriumError, NoSteadyStateError, SpindleFemError
+from spindle_fem.errors import (
+    BadInputError,
+    NoEquilibriumError,
+    NoSteadyStateError,
+    OutOfValidityError,
+    SpindleFemError,
+)
 from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
@@ -280,7 +286,7 @@ def _helix(
     }
 
 
-def solve_machine(content: dict[str, Any], file: Path) -> tuple[str, str]:
+def solve_machine(content: dict[str, Any], file: Path, *, meshed: bool = True) -> tuple[str, str]:
     """What becomes of a machine: ``solved``, ``refused``, ``unsettled`` or ``failed``, and why or how warm.
 
     Refused is what its definition, its geometry or its bearings rule out, by name; unsettled what elements or
@@ -294,19 +300,21 @@ def solve_machine(content: dict[str, Any], file: Path) -> tuple[str, str]:
     except Exception as error:  # noqa: BLE001 (what breaks is what is looked for)
         return "failed", f"check: {type(error).__name__}: {error}"
     try:
-        result = spindle_fem.solve(spec)
         state = solve_machine_network(build_machine_network(spec), OperatingPoint.of(spec))
-    except (BadInputError, NoEquilibriumError) as error:
+        result = spindle_fem.solve(spec) if meshed else None
+    except (BadInputError, NoEquilibriumError, OutOfValidityError) as error:
         return "refused", str(error)
     except NoSteadyStateError as error:
         return "unsettled", str(error)
     except Exception as error:  # noqa: BLE001
         word = "" if isinstance(error, SpindleFemError) else f"{type(error).__name__}: "
         return "failed", f"solve: {word}{error}"
+    network = state.bearing_temperatures()
+    if result is None:
+        return "solved", f"{max(item.ball for item in network.values()) - 273.15:.0f} °C"
     broken = [check.name for check in result.checks if not check.passed]
     if broken:
         return "failed", f"checks: {', '.join(broken)}"
-    network = state.bearing_temperatures()
     apart = max(abs(network[name].outer - item.temperature_outer) for name, item in result.bearings.items())
     warm = max(item.temperature_ball for item in result.bearings.values()) - 273.15
     return "solved", f"{warm:.0f} °C, network {apart:.1f} K apart"
@@ -318,6 +326,7 @@ def main() -> int:
     parser.add_argument("--number", type=int, default=12)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, help="This one of the seed's machines alone.")
+    parser.add_argument("--network", action="store_true", help="Without a mesh: geometry and network only.")
     parser.add_argument("--keep", type=Path, help="Folder for the definitions of those that failed.")
     arguments = parser.parse_args()
     counted: Counter[str] = Counter()
@@ -328,7 +337,7 @@ def main() -> int:
                 continue
             content = draw_machine(np.random.default_rng([arguments.seed, number]))
             start = time.process_time()
-            word, text = solve_machine(content, Path(folder) / "machine.toml")
+            word, text = solve_machine(content, Path(folder) / "machine.toml", meshed=not arguments.network)
             counted[word] += 1
             line = " ".join(text.split())
             spent = time.process_time() - start

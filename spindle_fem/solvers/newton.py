@@ -19,6 +19,8 @@ Matrix = sparse.csc_array | Array
 LARGEST_STEP = 1.0e9
 SMALLEST_DAMPING = 1.0e-4
 MOST_STEPS = 60
+# Steps in time: how many, K that one may warm, share of the imbalance that is near, K of what runs away.
+MOST_MARCHED, LONGEST_MARCH, NEAR_ENOUGH, HOTTEST_MARCHED = 200, 20.0, 1.0e-3, 900.0
 # K; a balance that is not linear must also have stopped moving.
 SETTLED = 1.0e-8
 
@@ -50,7 +52,19 @@ def newton(
     ConvergenceError
         Steps used up.
     """
-    temperature = np.array(start, dtype=float)
+    begun = np.array(start, dtype=float)
+    try:
+        return _iterated(balance, begun, enough)
+    except NoSteadyStateError:
+        nearer = _marched(balance, begun)
+        if nearer is None:
+            raise
+        return _iterated(balance, nearer, enough)
+
+
+def _iterated(balance: SparseBalance, start: Array, enough: float) -> tuple[Array, Matrix, int]:
+    """Damped steps from a start until they settle."""
+    temperature = start
     net, derivative = balance(temperature)
     norm = float(np.abs(net).max(initial=0.0))
     for step in range(1, MOST_STEPS + 1):
@@ -66,6 +80,52 @@ def newton(
         f"{MOST_STEPS} Newton steps left an imbalance of {norm:.3g} W.",
         "Start nearer to the solution or allow more steps.",
     )
+
+
+def _marched(balance: SparseBalance, start: Array) -> Array | None:
+    """Where implicit steps in time lead, every node given the capacity of its own losses; None if nowhere.
+
+    Cold grease may rub more as it warms: there Newton's step points away from where the machine warms to,
+    and steps in time, longer as less happens in them, follow it (pseudo-transient continuation).
+
+    Raises
+    ------
+    NoSteadyStateError
+        It warms without end.
+    """
+    temperature = start
+    net, derivative = balance(temperature)
+    first = float(np.abs(net).max(initial=0.0))
+    inertia = 1.0
+    for _ in range(MOST_MARCHED):
+        diagonal = np.asarray(derivative.diagonal())
+        # a node whose heat grows faster than its losses still has to warm forwards in time
+        share = np.where(diagonal > 0.0, max(inertia, 2.0), inertia)
+        try:
+            change = _step(balance, _with_inertia(derivative, share * np.abs(diagonal)), net)
+        except NoSteadyStateError:
+            return None
+        longest = float(np.abs(change).max(initial=0.0))
+        if longest > LONGEST_MARCH:
+            change = change * (LONGEST_MARCH / longest)
+        inertia *= 2.0 if longest > LONGEST_MARCH else 0.5
+        temperature = temperature + change
+        if not np.all(np.isfinite(temperature)):
+            return None
+        if temperature.max(initial=0.0) > HOTTEST_MARCHED:
+            hottest = balance.node_names[int(temperature.argmax())]
+            what = f'node "{hottest}" warms beyond {HOTTEST_MARCHED - 273.15:.0f} °C, and on.'
+            raise NoSteadyStateError(balance.name, what, "Lower speed, load or preload, or cool more.")
+        net, derivative = balance(temperature)
+        if float(np.abs(net).max(initial=0.0)) < NEAR_ENOUGH * first:
+            return temperature
+    return None
+
+
+def _with_inertia(derivative: Matrix, inertia: Array) -> Matrix:
+    if isinstance(derivative, np.ndarray):
+        return derivative - np.diag(inertia)
+    return sparse.csc_array(derivative - sparse.diags_array(inertia))
 
 
 def _step(balance: SparseBalance, derivative: Matrix, net: Array) -> Array:

@@ -6,6 +6,7 @@ import pytest
 from spindle_fem.errors import NoSteadyStateError, SpecError, UnknownSurfaceError
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.solvers.network_steady import solve_steady
+from spindle_fem.solvers.newton import _marched, newton
 
 
 def chain(**changes):
@@ -76,3 +77,37 @@ def test_a_body_without_loss_has_no_steady_state():
 def test_network_arrays_cannot_be_written():
     with pytest.raises(ValueError, match="read-only"):
         chain().capacity[0] = 1.0
+
+
+class OneNode:
+    """A node that loses 1 W/K to 293 K and rubs by a law of its temperature."""
+
+    name, node_names, is_linear = "one", ("node",), False
+
+    def __init__(self, heat):
+        self.heat = heat
+
+    def __call__(self, temperature):
+        net = self.heat(temperature) - (temperature - 293.0)
+        slope = (self.heat(temperature + 1e-5) - self.heat(temperature - 1e-5)) / 2e-5
+        return net, np.diag(slope - 1.0)
+
+    def rounding(self, temperature, derivative):
+        return 1e-9
+
+
+def test_steps_in_time_follow_grease_that_first_rubs_more_as_it_warms():
+    def hump(temperature):
+        return 60.0 + 300.0 * np.exp(-(((temperature - 330.0) / 15.0) ** 2))
+
+    found = _marched(OneNode(hump), np.array([318.0]))
+    balance, _ = OneNode(hump)(found)
+    # beyond the hump, where the heat has fallen to what is lost
+    assert found[0] > 345.0
+    assert abs(balance[0]) < 1.0
+    assert newton(OneNode(hump), np.array([318.0]))[0][0] == pytest.approx(found[0], abs=1.0)
+
+
+def test_what_warms_without_end_is_told_by_its_node():
+    with pytest.raises(NoSteadyStateError, match='"node" warms beyond 627'):
+        _marched(OneNode(lambda temperature: np.exp((temperature - 273.0) / 20.0)), np.array([400.0]))
