@@ -1,1 +1,1 @@
-"""Where a recording and a model differ, which physics was left out, and how much better it fits with it."""
+"""Diagnosis: where a recording and a model differ, which physics is missing, and how it improves the fit."""

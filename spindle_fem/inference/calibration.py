@@ -28,7 +28,7 @@ Progress = Callable[[str], None]
 BOUND_SIGMAS = 3.0
 # Probability of stated intervals.
 LEVEL = 0.90
-# A posterior narrower than this share of the prior was told something by the data.
+# The data have determined a parameter if its posterior is narrower than this share of the prior.
 LEARNED_BELOW = 0.8
 # Parameters are called inseparable above this correlation.
 CORRELATED_ABOVE = 0.9
@@ -36,7 +36,7 @@ CORRELATED_ABOVE = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What is known of one parameter after the fit.
+    """Result of the fit for one parameter.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class Calibration:
         return sorted(found, key=lambda pair: -abs(pair[2]))
 
     def unlearned(self) -> tuple[str, ...]:
-        """Parameters that the data say nothing about."""
+        """Parameters that the data do not determine."""
         return tuple(item.name for item in self.estimates if not item.learned)
 
 

@@ -1,4 +1,4 @@
-"""First-order answer of every channel to every candidate, about one common run.
+"""First-order response of every channel to every candidate, about one common run.
 
 A candidate's law is evaluated along the temperatures of that run, at all
 instants at once; the heat that it would add is marched through the linear
@@ -24,7 +24,7 @@ from spindle_fem.operation.term_memory import remembered
 
 Array = NDArray[np.float64]
 
-# Candidates whose answers are marched together, which bounds the memory of one march.
+# Candidates whose responses are marched together, which bounds the memory of one march.
 CHUNK = 256
 
 
@@ -58,7 +58,7 @@ def variants_of(candidates: Sequence[Candidate]) -> list[Variant]:
 
 
 class BaseRun:
-    """One recording simulated with what is known, about which candidates are judged.
+    """One recording simulated with the current estimates, about which candidates are judged.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class BaseRun:
 
     # ------------------------------------------------------------------ answers
     def outputs(self, tangent: Array, inlet: Array | None = None) -> Array:
-        """Channels' answer (G + 1, c, m) to changes of states (G + 1, r, m) and coolant inlet."""
+        """Channels' response (G + 1, c, m) to changes of states (G + 1, r, m) and coolant inlet."""
         owner = np.append(self.run.step_class, self.run.step_class[-1])
         column = self.predictor.fast.inlet_column if inlet is not None else None
         read = len(self.columns)
@@ -116,7 +116,7 @@ class BaseRun:
         return found
 
     def march(self, start: Array, end: Array, inlet: Array | None = None) -> Array:
-        """Channels' answer to loads (G, r, m) at both ends of the steps."""
+        """Channels' response to loads (G, r, m) at both ends of the steps."""
         return self.outputs(self.state_changes(start, end), inlet)
 
     def state_changes(self, start: Array, end: Array) -> Array:
@@ -187,7 +187,7 @@ class BaseRun:
         return memory
 
     def _sensed(self, terms: EffectTerms) -> Array:
-        """What a term reads at the grid, (G + 1, n_reads) K."""
+        """Sensed temperatures of a term at the grid, (G + 1, n_reads) K."""
         reads = [self.place_temperature(place) for place in terms.reads]
         return np.array(reads).reshape(-1, len(self.states)).T
 
@@ -229,7 +229,7 @@ class BaseRun:
         return self._coefficient[coefficient]
 
     def flow(self, coefficient: str, before: bool) -> Array:
-        """What a unit coefficient takes out at one end of every step, (G, r)."""
+        """Heat flow removed by a unit coefficient at one end of every step, (G, r)."""
         model = self.predictor.fast.model
         steps = len(self.drive.steps)
         states = self.states[:steps] if before else self.states[1:]
@@ -244,7 +244,7 @@ class BaseRun:
         return flow
 
     def told(self) -> Array:
-        """What the channels tell in this run, (G + 1, c) K."""
+        """Readings of the channels in this run, (G + 1, c) K."""
         if self._told is None:
             self._told = self.predictor.predict(self.number, self.values, self.candidates).temperature
         return self._told

@@ -1,9 +1,9 @@
-"""When something changed its level, from inner products of the answers to changes at a row of instants.
+"""Find when a level changed, from inner products of the responses to changes at a row of instants.
 
-A course of levels is a sum of steps, and what it does to the readings, to first order, the sum of the
-answers to them. Everything else that is uncertain has been integrated out of the inner products, so that the
-evidence of any set of instants is a closed expression: one instant and pairs of them are tried exhaustively
-beside those that are there, then each is moved and left out as long as that helps.
+A course of levels is a sum of steps; to first order the readings respond with the sum of the
+responses to them. Everything else that is uncertain has been integrated out of the inner products, so that
+the evidence of any set of instants is a closed expression: single instants and pairs are tried exhaustively
+beside those already found, then each is moved or left out as long as that improves the evidence.
 
 Source: Fearnhead (2006), Statistics and Computing 16, 203-213 (evidence of sets of change points, their
 number and places paid for).
@@ -54,12 +54,12 @@ def choice(count: int, number: int) -> float:
 
 
 def find_changes(gram: Array, data: Array, spread: float, most: int = MOST_CHANGES) -> Changes | None:
-    """The set of changes with the largest evidence; None where none helps.
+    """The set of changes with the largest evidence; None if none improves the fit.
 
     Parameters
     ----------
     gram : (k, k) ndarray
-        Inner products of the answers to a unit step at each instant.
+        Inner products of the responses to a unit step at each instant.
     data : (k,) ndarray
         With what is left of the readings.
     spread : float
@@ -99,7 +99,7 @@ def find_changes(gram: Array, data: Array, spread: float, most: int = MOST_CHANG
 def _root(scaled: Array, chosen: Sequence[int]) -> Array:
     """``W`` with ``Wᵀ W`` the inverse of the precision of steps at some instants, (m, m).
 
-    None of the precision's own values is below 1, whatever rounding leaves of steps that read alike.
+    No eigenvalue of the precision is below 1, whatever rounding leaves of indistinguishable steps.
     """
     values, vectors = np.linalg.eigh(scaled[np.ix_(chosen, chosen)] + np.eye(len(chosen)))
     return (vectors / np.sqrt(np.maximum(values, 1.0))).T
@@ -114,7 +114,7 @@ def _evidence(scaled: Array, along: Array, chosen: Sequence[int]) -> float:
 
 
 def _beside(scaled: Array, along: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
-    """Inner products of what the chosen ones leave of all answers."""
+    """Inner products of all responses after projecting out the chosen ones."""
     if not chosen:
         return scaled, along
     own = list(chosen)

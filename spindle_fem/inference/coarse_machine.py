@@ -40,7 +40,7 @@ SHARE, SPREAD = 0.3, 1.2
 
 @dataclass(frozen=True, slots=True)
 class Addition:
-    """One piece of structure, with what is left on held-out time over the noise before and with it."""
+    """One piece of structure, with the residual on held-out time over the noise before and with it."""
 
     statement: str
     left_before: float
@@ -49,7 +49,7 @@ class Addition:
 
 @dataclass(frozen=True, slots=True)
 class TooCoarse:
-    """That a machine cannot explain its own calibration.
+    """A machine that cannot explain its own calibration.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class TooCoarse:
 
     @property
     def statement(self) -> str:
-        """In words."""
+        """Describe it in words."""
         text = (
             "The machine as it is written is too coarse: fitted to its own calibration recordings it leaves "
             f"{self.left:.1f} times their noise."
@@ -84,7 +84,7 @@ class _Option:
 
 
 def refined(machine: DiagnosedMachine) -> DiagnosedMachine:
-    """The machine with what helps it to explain its calibration; as it is where that is not asked for."""
+    """The machine with structure added that helps to explain its calibration; unchanged if not applicable."""
     if not machine.is_network or not machine.calibration:
         return machine
     own, left, before = _fitted(machine)

@@ -60,7 +60,7 @@ class _Piece(Predictor):
     def start(
         self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
     ) -> float | Start:
-        """Where the piece before ended."""
+        """State at the end of the previous piece."""
         if self._begun is None:
             return super().start(number, values, derivatives)
         state, tangents = self._begun
@@ -159,7 +159,7 @@ class ContinuedRun:
     def _misdescribe(
         self, predictor: Predictor, told: Prediction, values: Mapping[str, float], names: Sequence[str]
     ) -> None:
-        """What directions of misdescription do to the readings, to first order, in place."""
+        """Add first-order changes of the readings by directions of misdescription, in place."""
         asked = [item for item in misdescriptions_of(predictor) if item.coordinate in names]
         structural = [item for item in asked if isinstance(item.change, StructuralChange)]
         if structural:

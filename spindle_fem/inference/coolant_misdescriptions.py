@@ -1,4 +1,4 @@
-"""What stood in hoses and channels when a recording began; the model's coolant is in step from the start."""
+"""Coolant that stood in hoses and channels before a recording; in the model it is in step from the start."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from spindle_fem.inference.misdescription import Change, Misdescription
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.machine.view.build_view import outlet_channels
 
-# Times in which what stood there leaves, s: a litre of hoses and channel at some litres a minute, and a
-# pocket that is rinsed slowly. Together they stand for any time between.
+# Times in which it is rinsed out, s: a litre of hoses and channel at some litres a minute, and a
+# pocket that is rinsed slowly. Together they cover any time between.
 RINSING_TIMES = (20.0, 100.0)
 
 
 @dataclass(frozen=True, slots=True)
 class StandingCoolant:
-    """Outlet readings of the first moments, off by what stood there.
+    """Error of the outlet readings in the first moments, by coolant that stood there.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class StandingCoolant:
     rinsing_time: float
 
     def __call__(self, base: BaseRun) -> Change:
-        """One kelvin at the recording's first moment."""
+        """Change by one kelvin at the recording's first moment."""
         column = base.predictor.recordings[base.number].temperature_names.index(self.channel)
         readings = np.zeros_like(base.told())
         grid = base.drive.grid
@@ -42,7 +42,7 @@ class StandingCoolant:
 
 
 def coolant_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
-    """What stood at every outlet that is read; width ``STANDING_COOLANT_SIGMA``."""
+    """A direction for every outlet that is read; width ``STANDING_COOLANT_SIGMA``."""
     if predictor.is_network:
         return
     for number, recording in enumerate(predictor.recordings):

@@ -15,7 +15,7 @@ DIRECTIONS = ("r", "z")
 START_PREFIX = "start."
 # How long before the middle of a gap an input had changed, s: ``jump.<recording>.<number>``.
 JUMP_PREFIX = "jump."
-# What happened within a piece of a gap beyond what the inputs beside it say,
+# Events within a piece of a gap beyond what the inputs beside it indicate,
 # ``within_gap.<recording>.<number>``: friction of a bearing set, as a share of the highest that it gives; an
 # input temperature that is another after the gap, as a share of its change.
 GAP_PREFIX = "within_gap."

@@ -108,10 +108,10 @@ class CumulativeSums:
         self.sums = np.zeros((channels, 2, len(REFERENCES)))
 
     def add(self, numbers: Array) -> None:
-        """Take one number a channel, (channels,); NaN where a channel says nothing."""
+        """Add one number per channel, (channels,); NaN for channels without information."""
         known = np.nan_to_num(np.clip(numbers, -OUTLIER, OUTLIER))
         moved = self.sums + np.stack((known, -known), axis=1)[:, :, None] - self._references
-        # No higher than the level: what is over is left as fast as it was entered.
+        # Clipped at the level, so that an alarm ends as fast as it began.
         moved = np.clip(moved, 0.0, self._high)
         self.sums = np.where(np.isfinite(numbers)[:, None, None], moved, self.sums)
 

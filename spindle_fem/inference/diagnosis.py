@@ -50,7 +50,7 @@ MOST_WORKERS = 4
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What was found, and what it rests on.
+    """Result of a diagnosis, and what it is based on.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Diagnosis:
     wrong : WrongDirection or None
         Direction whose prior was given up.
     states : mapping of str to Told
-        Hidden states of the chosen set as all readings tell them, by the name of their amplitude.
+        Hidden states of the chosen set inferred from all readings, by the name of their amplitude.
     """
 
     predictor: Predictor
@@ -91,7 +91,7 @@ class Diagnosis:
     states: Mapping[str, Told] = field(default_factory=dict)
 
     def told(self, candidate: Candidate) -> Candidate:
-        """A candidate of the chosen set, with the intervals that all readings tell where it switches."""
+        """A candidate of the chosen set, with its intervals inferred from all readings if it switches."""
         chosen = any(c is candidate for c in self.final.candidates)
         own = self.states.get(candidate.amplitude) if chosen else None
         return candidate if own is None else own.candidate
@@ -153,7 +153,7 @@ def diagnose_recordings(
     small, known = searched_predictor(predictor, view, candidates)
     problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
     if directions:
-        # What they do, about the machine as its recordings have it.
+        # Their columns, about the machine as its recordings show it.
         values = problem.fit().values
         predictor = with_misdescriptions(predictor, directions, values)
         small = small.misdescribed_like(predictor)
@@ -237,9 +237,9 @@ def diagnose_recordings(
 
 
 def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:
-    """Components that a decision does not tell apart from each.
+    """Components that a decision does not distinguish from each component.
 
-    A set, its bearings, its other bearings; a probe and what it sits in.
+    A set, its bearings, its other bearings; a probe and the part it sits in.
     """
     found: dict[str, set[str]] = {}
     for group in view.groups:
@@ -256,14 +256,14 @@ def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:
 
 
 class _Readings:
-    """What fits have the channels read, and how far that is apart.
+    """Predicted readings of fits, and residuals of single readings.
 
     Parameters
     ----------
     final, plain : Problem
         With effects, and with nothing missing.
     follow : callable
-        Hidden states of a fit as all readings tell them, as :func:`told_states` gives them.
+        Hidden states of a fit from all readings, as :func:`told_states` gives them.
     """
 
     def __init__(
@@ -292,7 +292,7 @@ class _Readings:
         return largest
 
     def left(self, fit: Fit) -> float:
-        """Root mean square of what a fit leaves of single readings over their noise, all channels alike."""
+        """Root mean square residual of single readings over their noise, all channels weighted equally."""
         plant = self._plant
         return left_over_noise(plant, plant.observations, self._followed(fit, plant.observations), fit.values)
 
@@ -303,7 +303,7 @@ class _Readings:
         return [(item.bins, values - item.values) for item, values in zip(seen, told, strict=True)]
 
     def beyond(self, fit: Fit) -> float:
-        """Likewise of held-out readings; what switches is on there as all readings tell it."""
+        """Residual of held-out readings likewise; switching states follow all readings."""
         plant = self._plant
         if not plant.heldout:
             return 0.0
@@ -321,7 +321,7 @@ class _Readings:
         )
 
     def _followed(self, fit: Fit, seen: Sequence[Observation]) -> list[Array]:
-        """What readings should be; what switches is on as all readings tell it, held-out ones included.
+        """Predicted readings; switching states follow all readings, held-out ones included.
 
         Where a state is not known within a held-out block, the readings after it miss its heat.
         """
@@ -387,7 +387,7 @@ def _refit(
     """The most probable hypotheses, what reads nearly as the first, and the empty one, on the whole basis."""
     score = {id(h): value for h, value in zip(found, tempered(found, coarseness), strict=True)}
     everything = sorted(found, key=lambda h: -score[id(h)])
-    # Whether anything is missing is asked for itself (the p-value): sets are held against each other.
+    # Whether anything is missing is a separate question (the p-value): here sets are compared.
     ranked = [h for h in everything if h.keys] or everything
     best = score[id(ranked[0])]
     chosen = [
@@ -395,7 +395,7 @@ def _refit(
         for position, item in enumerate(ranked[: tuned.REFITTED])
         if position < tuned.ALWAYS_REFITTED or score[id(item)] > best - tuned.NEGLIGIBLE_SCORE
     ]
-    # The slow error has changed since the search: whether the best set needs each member is asked again.
+    # The slow error has changed since the search: test again whether the best set needs each member.
     members = ranked[0].keys
     smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
     chosen += [h for h in smaller if h not in chosen]
@@ -415,7 +415,7 @@ def _refit(
         for distance, _, h in nearest[: tuned.NEAREST_REFITTED]
         if distance < tuned.NEAREST_WITHIN * tuned.NEAR_READINGS
     ]
-    # What stays far behind the first set need not be followed to its optimum.
+    # Sets far behind the first need not be fitted to their optimum.
     begun = problem.fit(first.candidates, first.values, iterations=0).misfit_with_prior
     behind = begun + 2.0 * tuned.HOPELESS_SCORE
     orders = [

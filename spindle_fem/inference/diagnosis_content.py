@@ -30,7 +30,7 @@ SCHEMA = "spindle-fem/diagnosis/1"
 def diagnosis_content(
     diagnosis: Diagnosis, opened: DiagnosedMachine, before: Sequence[np.ndarray], after: Sequence[np.ndarray]
 ) -> dict[str, Any]:
-    """Everything that a diagnosis found, but the full model's answer and the next measurement.
+    """Everything that a diagnosis found, except the full model's check and the next measurement.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def diagnosis_content(
 
 
 def _told(diagnosis: Diagnosis) -> dict[str, float]:
-    """Held-out error with the states that all readings tell, at parameters that saw no held-out reading."""
+    """Held-out error with states from all readings, at parameters fitted without held-out readings."""
     if not diagnosis.states:
         return {}
     final = diagnosis.final
@@ -136,7 +136,7 @@ def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def unexplained_content(opened: DiagnosedMachine, reason: str) -> dict[str, Any]:
-    """A recording that is sound but says too little."""
+    """Content for a recording that is sound but has too little information."""
     channels = [
         {"channel": name, "rmse_K": None, "noise_K": float(sigma), "max_K": None}
         for recording in opened.recordings
@@ -176,7 +176,7 @@ def unexplained_content(opened: DiagnosedMachine, reason: str) -> dict[str, Any]
 
 
 def plain_data(value: Any) -> Any:
-    """Numbers as JSON knows them; what is not finite becomes null."""
+    """Data as JSON allows it; numbers that are not finite become null."""
     if isinstance(value, dict):
         return {key: plain_data(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -61,7 +61,7 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
         ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
     start[:, beside] = end[:, beside] = _means(fine, grid)[:, beside]
     step_class, points = classes_of(0.5 * (start + end), INLET_BIN, SPEED_BIN)
-    # Within the range that occurs, so that no property is asked for outside it.
+    # Clipped to the range that occurs, so that no property is evaluated outside it.
     inlets = np.array([p.coolant_inlet_temperature for p in points])
     steps = np.round((inlets - inlets.min()) / INLET_STEP) * INLET_STEP
     shared = np.minimum(inlets.min() + steps, inlets.max()).tolist()
@@ -131,7 +131,7 @@ def _amid_gaps(fine: Drive, recording: Recording) -> Drive:
         return fine
     owners = np.array([after - 1 for _, after in spans])
     first, last, after = fine.start[owners], fine.end[owners], fine.start[owners + 1]
-    # What is not held is straight over the gap.
+    # Inputs that are not held are linear over the gap.
     middle = 0.5 * (first + last)
     end = fine.end.copy()
     end[owners] = np.where(columns, last, middle)

@@ -123,7 +123,7 @@ def findings_of(diagnosis: Diagnosis, ranked: Ranked, *, split: bool) -> list[di
     """Findings of a set; where ``split``, each carries its share of the set's probability.
 
     Shares keep the sum of all probabilities in a file at most one; the set's
-    own probability stands beside them.
+    own probability is stored beside them.
     """
     count = max(len(ranked.fit.candidates), 1)
     share = ranked.probability / count if split else ranked.probability
@@ -151,9 +151,9 @@ def states_of(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def predictions_at_stamps(predictor: Predictor, fit: Fit) -> list[Array]:
-    """What every channel of every recording should read at its own stamps, (N, c) K.
+    """Predicted readings of every channel of every recording at its own stamps, (N, c) K.
 
-    Displacements, in µm, count from where their sensor was set, as well as the readings tell.
+    Displacements, in µm, count from the sensor's zero, which is estimated from the readings.
     """
     found = []
     for number, recording in enumerate(predictor.recordings):

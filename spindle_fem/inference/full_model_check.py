@@ -65,7 +65,7 @@ Keep = Callable[[str, tuple[Array, ...]], None]
 
 @dataclass(frozen=True, slots=True)
 class FullFit:
-    """One fit run through the full model.
+    """One fit simulated by the full model.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ def require_choice(choice: str) -> str:
 
 
 def nothing_run(mesh: str, reason: str) -> dict[str, Any]:
-    """What stands in the place of errors where there are none."""
+    """Content in place of errors if nothing was run."""
     return {"mesh": mesh, "reason": reason}
 
 
@@ -129,7 +129,7 @@ def full_model_errors(
     Returns
     -------
     dict
-        ``mesh`` (as asked or chosen), ``reason`` (why nothing was run, else
+        ``mesh`` (as requested or chosen), ``reason`` (why nothing was run, else
         None), and what was run: ``preset``, ``order``, ``unknowns``,
         ``step_error_K``, ``coupling_tolerance_K``, ``before`` and ``after`` (``train_rmse_K``,
         ``heldout_rmse_K``, ``channels``, ``steps``, ``seconds``),
@@ -163,7 +163,7 @@ def full_model_errors(
 
 
 def options_for(predictor: Predictor) -> TransientOptions:
-    """How accurately time is followed: as accurately as the quietest channel can tell."""
+    """Accuracy of the time integration: as accurate as the quietest channel can resolve."""
     levels = [
         channel_noise(predictor, recording, channel)
         for recording in predictor.recordings
@@ -182,7 +182,7 @@ def options_for(predictor: Predictor) -> TransientOptions:
 
 
 def expected_steps(predictor: Predictor, options: TransientOptions) -> int:
-    """Time steps that the inputs ask for at least, over all recordings."""
+    """Lower bound of the time steps that the inputs require, over all recordings."""
     steps = 0
     for drive in predictor.drives:
         history = OperatingHistory.of(predictor.fast.spec, inputs_of_drive(drive))
@@ -291,7 +291,7 @@ def physics_of_fit(predictor: Predictor, number: int, fit: Fit) -> Physics:
         for term in candidate.terms
         for name, item in term.names().items()
     }
-    # What belongs to a candidate is a factor only where it says so.
+    # Values that belong to a candidate are factors only if it declares so.
     of_candidates = {
         name for c in fit.candidates for name in c.parameters if name not in {item.name for item in c.factors}
     }
@@ -328,7 +328,7 @@ def _side_by_side(
     options: TransientOptions,
     progress: Progress,
 ) -> dict[str, FullFit]:
-    """Each fit in a process of its own; in this one, and said, where a process ends before its time."""
+    """Each fit in its own process; in this one, with a warning, if a process ends prematurely."""
     progress(f"full model: {' and '.join(fits)}")
     jobs = [partial(_run_alone, machine.spec, predictor, fit, options) for fit in fits.values()]
     try:
@@ -364,7 +364,7 @@ def _run(
 
 
 def _readings(predictor: Predictor, number: int, fit: Fit, run: MachineTransient) -> Array:
-    """What the temperature channels tell of a full run, on the grid of the reduced model, (G + 1, c) K."""
+    """Readings of the temperature channels in a full run, on the reduced model's grid, (G + 1, c) K."""
     recording = predictor.recordings[number]
     count = recording.temperature_count
     told = np.column_stack([run.reading(probe) for probe in recording.probes[:count]])
@@ -374,7 +374,7 @@ def _readings(predictor: Predictor, number: int, fit: Fit, run: MachineTransient
 
 
 def _first_order(predictor: Predictor, number: int, fit: Fit, count: int) -> Array | float:
-    """What the places of the probes and the gaps change before the fit's own sensor effects, (G + 1, n) K."""
+    """First-order changes by probe positions and gaps, before the fit's sensor effects, (G + 1, n) K."""
     if not any(name.startswith(FIRST_ORDER) for name in fit.values):
         return 0.0
     bare = [replace(item, reading=None) for item in fit.candidates]

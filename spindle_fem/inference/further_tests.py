@@ -71,7 +71,7 @@ class TrialPredictor(Predictor):
     def __init__(self, predictor: Predictor, drive: Drive) -> None:
         self.__dict__.update(copy.copy(predictor.__dict__))
         self.drives = (replace(drive, times=drive.grid),)
-        # What its directions do is another thing in another operation.
+        # Directions act differently in another operation.
         self.misdescribed, self._stacked = (), {}
         self.recordings, self.columns = predictor.recordings[:1], predictor.columns[:1]
         self.observations, self.heldout = (), ()
@@ -93,7 +93,7 @@ class TrialPredictor(Predictor):
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a hypothesis predicts for a trial.
+    """Prediction of a hypothesis for a trial.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ def answer(predictor: Predictor, fit: Fit, trial: Trial, places: Sequence[Place]
     Parameters
     ----------
     spacing : float, [s]
-        Distance of the instants at which readings are told.
+        Interval between the instants of the readings.
 
     Raises
     ------

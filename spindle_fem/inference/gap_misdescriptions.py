@@ -1,4 +1,4 @@
-"""Heat of a network within gaps of its recordings: what sources may have done there that nobody recorded."""
+"""Unrecorded heat of a network within gaps of its recordings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LEAST_VARIANCE, MOST_MODES = 0.02, 6
 MOST_POINTS = 200
 # Instants of change that are open for one source.
 MOST_CHANGES = 150
-# What moves no node by this share of the least noise, were it to keep all its heat, is left out.
+# Left out if it would raise no node by this share of the least noise, even if the node kept all the heat.
 LEAST_RISE = 0.2
 
 
@@ -56,8 +56,8 @@ class HeatWithinGap:
 def gap_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
     """Directions of a network whose sources follow inputs that are held over gaps.
 
-    How much a source may have differed from the value held is told by its own record elsewhere: its heat is
-    taken for a stationary Gaussian process of the autocovariance that the rest of the recording has, known
+    How much a source may have differed from the value held is estimated from its record elsewhere: its heat
+    is modelled as a stationary Gaussian process with the autocovariance of the rest of the recording, known
     at both ends of the gap.
 
     Source: Rasmussen & Williams (2006), Gaussian Processes for Machine Learning, section 2.2.

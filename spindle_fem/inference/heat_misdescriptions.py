@@ -1,4 +1,4 @@
-"""How a machine with geometry may differ in its heat and balls over speed, materials, sensors and clocks."""
+"""Possible deviations of a machine with geometry: heat and balls over speed, materials, sensors, clocks."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def clock_change(base: BaseRun) -> Change:
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """A channel that tells what was there some seconds before: its sensor answers with a delay."""
+    """Delay of a channel: its sensor shows the temperature of some seconds before."""
 
     channel: str
 
@@ -135,7 +135,7 @@ class Response:
 def shape_modes(speed: Array, length: float) -> list[tuple[float, Array]]:
     """Independent shapes of a curve over speed beside its mean, by falling size.
 
-    A Gaussian process of unit variance whose values are alike over ``length`` of the range, less its mean
+    A Gaussian process of unit variance, correlated over ``length`` of the range, less its mean
     (which the heat factor has): its Karhunen-Loève modes.
 
     Source: Rasmussen & Williams (2006), Gaussian Processes for Machine Learning, section 4.3.
@@ -205,7 +205,7 @@ def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
 
 
 def _over_speed(predictor: Predictor) -> Iterator[Misdescription]:
-    """What follows speed."""
+    """Directions that depend on speed."""
     spec = predictor.fast.spec
     highest = float(max(spec.heat.table.speed))
     speed = np.linspace(0.0, highest, MODE_POINTS)

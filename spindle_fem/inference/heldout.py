@@ -1,4 +1,4 @@
-"""Which readings a diagnosis does not look at, to show afterwards what it predicts."""
+"""Readings held out of a diagnosis, to show afterwards how well it predicts them."""
 
 from __future__ import annotations
 

@@ -13,13 +13,13 @@ from spindle_fem.inference.switching_model import LinearAnswer, Readings
 
 Array = NDArray[np.float64]
 
-# An input counts as zero up to this share of its largest; it tells something where it is so, and not so, for
-# at least this share of the time.
+# An input counts as zero up to this share of its largest value; it is informative if it is both zero and not
+# zero for at least this share of the time.
 ZERO_SHARE, LEAST_SHARE = 0.01, 0.03
 
 
 def answer_of(base: BaseRun, pattern: Pattern) -> LinearAnswer:
-    """How a machine about one of its runs answers to a unit of heat, or of conductance, at a spot."""
+    """Response of a machine about one of its runs to a unit of heat, or of conductance, at a spot."""
     run, model = base.run, base.predictor.fast.model
     load = np.mean([model.place(place) for place in pattern.places], axis=0)
     steps, size = len(base.drive.steps), model.size
@@ -44,7 +44,7 @@ def answer_of(base: BaseRun, pattern: Pattern) -> LinearAnswer:
 
 
 def without(fit: Fit, left_out: Candidate) -> tuple[tuple[Candidate, ...], dict[str, float]]:
-    """The other candidates of a fit, and the values of what is left."""
+    """The other candidates of a fit, and their values."""
     own = {c.name for c in candidate_coordinates(left_out)}
     values = {name: value for name, value in fit.values.items() if name not in own}
     return tuple(c for c in fit.candidates if c is not left_out), values
@@ -53,7 +53,7 @@ def without(fit: Fit, left_out: Candidate) -> tuple[tuple[Candidate, ...], dict[
 def readings_about(
     problem: Problem, fit: Fit, number: int, left_out: Candidate | None = None, *, everything: bool = False
 ) -> Readings:
-    """What a fit leaves of the readings of one recording, at the ends of the steps of its run.
+    """Residuals of a fit for one recording, at the ends of the steps of its run.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def readings_about(
     slow = [problem.slow.of(channel) for channel in range(usable.shape[1])]
     residual = np.full((len(grid), usable.shape[1]), np.nan)
     variance = np.ones_like(residual)
-    # Where a displacement's sensor was set is open: it tells no state by its level.
+    # The zero of a displacement sensor is unknown: its level carries no information on the state.
     for channel in range(recording.temperature_count):
         rows = np.flatnonzero(usable[:, channel])
         left = recording.temperature[rows, channel]

@@ -38,7 +38,7 @@ class Hypothesis:
 
     @property
     def misfit(self) -> float:
-        """What is compared between hypotheses: half its difference is a logarithm of likelihoods."""
+        """Quantity compared between hypotheses: half its difference is a logarithm of likelihoods."""
         return self.fit.misfit_with_prior if self.deviance is None else self.deviance
 
     @property
@@ -53,5 +53,5 @@ class Hypothesis:
 
 
 def identity(candidates: Iterable[Candidate]) -> frozenset:
-    """What tells a set of candidates from others: effects, places, forms and numbers of free parameters."""
+    """Identity of a set of candidates: effects, places, forms and numbers of free parameters."""
     return frozenset((c.effect, c.component, c.form, len(c.free)) for c in candidates)

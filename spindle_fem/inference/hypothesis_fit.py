@@ -81,7 +81,7 @@ class Coordinate:
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """What is known of the machine's own coordinates before the diagnosed recording.
+    """Knowledge of the machine's own coordinates before the diagnosed recording.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Belief:
 
     @classmethod
     def prior(cls, coordinates: Sequence[Coordinate]) -> Belief:
-        """As the definition says."""
+        """Belief from the definition alone."""
         return cls(tuple(coordinates), np.zeros(len(coordinates)), np.eye(len(coordinates)))
 
 
@@ -120,7 +120,7 @@ class Fit:
     residual : (n,) ndarray
         Whitened.
     evaluations : int
-        Predictions that were asked for.
+        Number of predictions.
     """
 
     candidates: tuple[Candidate, ...]
@@ -285,7 +285,7 @@ class Problem:
         hopeless : float
             Misfit that must be within reach of the next steps; else the search ends where it is.
         exact : bool
-            Whether to go on until a step gains next to nothing, not only less than tells hypotheses apart.
+            Whether to continue until steps gain almost nothing, not only less than what matters for ranking.
 
         Raises
         ------

@@ -1,9 +1,9 @@
-"""What a search for hypotheses holds, and its single steps: screen, fit, extend.
+"""State of a search for hypotheses and its single steps: screen, fit, extend.
 
-What the best fits so far leave is screened to first order against all
+The residuals of the best fits so far are screened to first order against all
 candidates; the most promising additions are fitted with their full terms.
 Pairs and triples that only make sense together come from the same screening.
-In which order this happens stands in :mod:`spindle_fem.inference.search_course`.
+The order of these steps is in :mod:`spindle_fem.inference.search_course`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Progress = Callable[[str], None]
 # A set, and values to begin from.
 Task = tuple[tuple[Candidate, ...], Mapping[str, float]]
 
-# More effects at once have not been asked for, and no recording tells them apart.
+# No recording can distinguish larger sets.
 LARGEST_SET = 3
 # Sets that are fitted together before the best of them says what is hopeless: first those that promise most,
 # then more at a time to keep all workers busy.
@@ -146,7 +146,7 @@ class Search:
         return found, intervals
 
     def _residual(self, fit: Fit) -> tuple[Array, Array]:
-        """What a fit leaves of the readings of the first recording that may be used, NaN elsewhere."""
+        """Residuals of a fit for the first recording's usable readings, NaN elsewhere."""
         predictor = self.problem.predictor
         recording = predictor.recordings[0]
         predicted = predictor.predict(0, fit.values, fit.candidates).temperature
@@ -223,10 +223,10 @@ class Search:
         self._paid[identity((candidate,))] = paid
 
     def hypothesis(self, fit: Fit, paid: float = 0.0) -> Hypothesis:
-        """A fitted set with its prior, and what the courses of hidden states in it cost.
+        """A fitted set with its prior, and the cost of the courses of its hidden states.
 
-        A course is chosen by single readings, which tell more of it than the means that are fitted: what it
-        costs counts as a share of what it gains.
+        A course is chosen by single readings, which determine it better than the means that are fitted: its
+        cost counts as a share of its gain.
 
         Parameters
         ----------
@@ -281,14 +281,14 @@ class Search:
             for (candidates, _), fitted in zip(
                 together, self.workers.fits(self.problem, orders), strict=True
             ):
-                # What cannot be simulated explains nothing; its neighbours are tried.
+                # Sets that cannot be simulated explain nothing; their neighbours are tried.
                 if fitted is None or any(self._unseen(c, fitted.values) for c in candidates):
                     continue
                 paid = sum(self._paid.get(identity((c,)), 0.0) for c in candidates)
                 self.keep(self.hypothesis(fitted, paid))
 
     def _unseen(self, candidate: Candidate, values: Mapping[str, float]) -> bool:
-        """Whether an event is told where nothing was recorded, neither readings nor inputs."""
+        """Whether an event lies where nothing was recorded, neither readings nor inputs."""
         if not self.in_intervals(candidate) or self.is_hidden_state(candidate):
             return False
         on = self.effects[candidate.effect].intervals(candidate, values)
@@ -306,7 +306,7 @@ class Search:
         )
 
     def _hidden_time(self, span: tuple[float, float], recording: int) -> float:
-        """How much of an interval lies in gaps, s."""
+        """Part of an interval that lies in gaps, s."""
         gaps = self.problem.predictor.gap_intervals(recording)
         return sum(max(0.0, min(span[1], stop) - max(span[0], begin)) for begin, stop in gaps)
 
@@ -315,14 +315,14 @@ class Search:
         return self.ranked()[0].fit.misfit_with_prior + 2.0 * self.reach(size)
 
     def reach(self, size: int) -> float:
-        """How much less likely than the best a set may be and still matter."""
+        """Largest deficit in log probability at which a set may still matter."""
         if size > 1:
             return tuned.HOPELESS_SCORE
         gain = self.ranked()[0].score - self.found[identity(())].score
         return max(tuned.HOPELESS_SCORE, (1.0 - tuned.FAIR_SHARE) * gain)
 
     def keep(self, hypothesis: Hypothesis) -> None:
-        """Add a fitted hypothesis to what was found, unless it is on when nobody could have seen it."""
+        """Add a fitted hypothesis to those found, unless it is on only where nothing was recorded."""
         values = hypothesis.fit.values
         for candidate in filter(self.in_intervals, hypothesis.fit.candidates):
             on = self.effects[candidate.effect].intervals(candidate, values)
@@ -349,7 +349,7 @@ class Search:
 
 
 def intervals_cost(item: OnOff) -> float:
-    """What choosing the intervals costs, as a logarithm."""
+    """Cost of choosing the intervals, as a logarithm."""
     options = item.options * (item.options + 1) / 2
     number = len(item.intervals)
     return number * float(np.log(options)) - float(np.sum(np.log(np.arange(1, number + 1))))

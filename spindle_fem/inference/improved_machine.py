@@ -35,7 +35,7 @@ def _without_directions(diagnosis: Diagnosis) -> Fit:
     root = np.linalg.cholesky(np.linalg.inv(covariance)).T
     known = Belief(tuple(belief.coordinates[i] for i in kept), belief.mean[kept], root)
     slow, fit = diagnosis.calibrated.slow, diagnosis.final
-    # What directions took up is slow error now: the second fit knows how large.
+    # The part explained by directions is slow error now: the second fit knows its size.
     for _ in range(2):
         problem = Problem(predictor, known, slow, predictor.observations)
         fit = problem.fit(fit.candidates, fit.values)
@@ -46,9 +46,9 @@ def _without_directions(diagnosis: Diagnosis) -> Fit:
 def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     """Text of the definition with the fitted parameters and an ``[[effect]]`` for each finding.
 
-    Parameters keep what is left of their uncertainty. Directions of misdescription
-    that a key of the definition stands for are put right; where a probe sits
-    within its hole is left as the definition has it. No key stands for those of
+    Parameters keep their remaining uncertainty. Directions of misdescription
+    that correspond to a key of the definition are corrected; the position of a probe
+    in its hole is left as defined. No key corresponds to those of
     a network: its parameters are fitted once more, without them.
     """
     fit = _without_directions(diagnosis) if machine.is_network else diagnosis.final

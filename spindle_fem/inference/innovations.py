@@ -1,6 +1,6 @@
-"""What readings say beyond those before them: a Kalman filter over parameters and slow errors.
+"""Information of readings beyond those before them: a Kalman filter over parameters and slow errors.
 
-Unknown are the machine's coordinates (in units of their priors) and one slow error a channel. A reading is
+Unknown are the machine's coordinates (in units of their priors) and one slow error per channel. A reading is
 the prediction, plus its derivatives times the departure of the coordinates, plus the slow error, plus white
 noise. As long as the machine is as its model and the noise as stated, the differences between readings and
 what those before them lead to expect are independent from instant to instant, of known spread.

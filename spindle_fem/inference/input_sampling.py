@@ -1,7 +1,7 @@
-"""What a fit leaves beside the noise of readings, and what rarely written inputs leave open.
+"""Residuals beyond the noise of readings, and the uncertainty left by rarely recorded inputs.
 
-A held input says nothing of what it did until its next row. What it did is taken for white noise of the
-variance that its own changes from row to row have, and the network answers it as a filter does.
+A held input is unknown until its next row. It is modelled as white noise with the
+variance of its changes from row to row, and the network responds as a filter.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def sampling_errors(network: ThermalNetwork, power: Array) -> Array:
 
 
 def own_times(network: ThermalNetwork) -> Array:
-    """In which every node settles by itself, (n_nodes,) s."""
+    """Time constant of every node by itself, (n_nodes,) s."""
     return network.capacity / np.maximum(np.diag(network.conductance_matrix())[: network.n_nodes], 1e-12)
 
 
@@ -74,10 +74,10 @@ def left_over_noise(
     told: Sequence[Array],
     factors: Mapping[str, float],
 ) -> float:
-    """Robust root mean square of single readings less what is told, over their noise, all temperatures alike.
+    """Robust root mean square of single residuals over their noise, all temperatures weighted equally.
 
-    Sensors of a machine with geometry also have the slow error that is expected of them before any fit; of
-    a network's, ``sigma`` is all that is known.
+    Sensors of a machine with geometry also have the slow error expected of them before any fit; for
+    those of a network only ``sigma`` is known.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def left_over_noise(
         thinned = recording.defects.thinned
         each = 1.0 if thinned is None else thinned.rows / thinned.bins
         noise = item.bins.white**2 * each
-        # What averaging took off the noise is put back.
+        # Restore the noise that averaging removed.
         averaged = noise * (1.0 - float(np.mean(1.0 / item.bins.number)) / each)
         if not predictor.is_network:
             noise += tuned.EXPECTED_SLOW_SIGMA**2

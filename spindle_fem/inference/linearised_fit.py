@@ -76,10 +76,10 @@ class Box:
 
 
 def bounded_minimum(hessian: Array, downhill: Array, low: Array, high: Array) -> Array:
-    """Where ``x H x / 2 - g x`` is least between bounds, (n,).
+    """Minimum of ``x H x / 2 - g x`` between bounds, (n,).
 
-    All coordinates that are beyond a bound, or held at one that they would leave, change sides at once;
-    where that no longer makes them fewer, the last one alone, which ends for every positive definite ``H``.
+    All coordinates that violate a bound, or are held at one that they would leave, change sides at once;
+    if that does not reduce their number, only the last one does. Ends for every positive definite ``H``.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class BoxedColumns:
 
 @dataclass(frozen=True, slots=True)
 class LinearProblem:
-    """A problem about one of its fits: data = J u + sum of columns, u known as the belief says.
+    """A problem about one of its fits: data = J u + sum of columns, with the belief as prior of u.
 
     Attributes
     ----------
@@ -178,12 +178,12 @@ class LinearProblem:
 
     @classmethod
     def about(cls, problem: Problem, fit: Fit, trust: Fit | None = None) -> LinearProblem:
-        """Linearised about a fit; coordinates that it presses against a bound stay there.
+        """Linearise about a fit; coordinates pressed against a bound stay there.
 
         Parameters
         ----------
         trust : Fit or None
-            Fit whose residuals tell which readings went astray; None for the first one.
+            Fit whose residuals show which readings are outliers; None for the first one.
         """
         predicted = problem.predict(fit.candidates, fit.coordinates, fit.position)
         jacobian = problem.whitened([p.sensitivity for p in predicted])
@@ -198,7 +198,7 @@ class LinearProblem:
         departure = root @ (fit.position - mean)
         downhill = jacobian.T @ (weight**2 * residual) - root.T @ departure
         free = ~_pressed(fit, downhill)
-        # What is known of the free coordinates, given those that stay.
+        # Belief about the free coordinates, given those that stay.
         q, r = np.linalg.qr(root[:, free])
         unit = np.linalg.solve(r.T, jacobian[:, free].T).T
         return cls(

@@ -1,4 +1,4 @@
-"""What the sensors of a machine and a test could tell apart, before anything is measured.
+"""Effects that the sensors of a machine and a test could distinguish, before anything is measured.
 
 Every effect of the catalogue at every place is given its usual size on the
 model of the planned test; what the machine's uncertain numbers, the probes'
@@ -44,11 +44,11 @@ from spindle_fem.inference.told_apart import ChannelProducts, EffectForms, Separ
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-# Intervals of unrecorded heat or cooling that stand for all others, as shares of the test.
+# Intervals of unrecorded heat or cooling that represent all others, as shares of the test.
 INTERVALS = ((0.0, 1.0), (0.05, 0.35), (0.2, 0.5), (0.35, 0.65), (0.5, 0.8), (0.65, 0.95), (0.4, 0.95))
 # Prior of nothing missing over that of one effect.
 NOTHING = tuned.NUMBER_PRIOR[0] / tuned.NUMBER_PRIOR[1]
-# Sizes beyond this many usual ones are not told: answers to first order say nothing of them.
+# Sizes beyond this multiple of the usual one are not reported: first-order responses do not cover them.
 LARGEST_MULTIPLE = 5.0
 # Further sensors that are chosen one after another.
 SENSORS_ADDED = 3
@@ -61,7 +61,7 @@ class Hypothetical:
     Attributes
     ----------
     main : Variant
-        Its likeliest form, in whose size the others are told.
+        Its likeliest form, in whose size the others are expressed.
     weight : float
         Prior, of all effects at all places together 1.
     """
@@ -85,7 +85,7 @@ class Hypothetical:
         return name, told[name].value, told[name].unit
 
     def size(self, multiple: float) -> tuple[str, float, str] | None:
-        """The same; None beyond what can be."""
+        """Size as parameter name, value and unit; None beyond the possible range."""
         candidate = self.main.candidate
         item = candidate.parameters[candidate.amplitude]
         limit = item.high if candidate.reference > candidate.null else item.low
@@ -103,7 +103,7 @@ class Option:
     information : float
         Mean over all pairs, bits.
     seen, told : int
-        Effects seen at their usual size, and of these told from every other.
+        Effects seen at their usual size, and those of them distinguishable from every other.
     """
 
     name: str
@@ -116,20 +116,20 @@ class Option:
 
 @dataclass(frozen=True)
 class MeasurementPlan:
-    """What a test with some sensors would tell.
+    """Predicted information of a test with some sensors.
 
     Attributes
     ----------
     machine : DiagnosedMachine
         On the test first, then on those compared with it.
     separation : Separation
-        Of the sensors and the test asked for.
+        For the requested sensors and test.
     further_sensors : tuple of Option
-        Each place with the sensors that are there, the most telling first.
+        Each place with the existing sensors, the most informative first.
     sensors_in_turn : tuple of Option
-        The most telling place, then the most telling beside it, and so on.
+        The most informative place, then the most informative beside it, and so on.
     tests : tuple of Option
-        All tests with the sensors that are there, the most telling first; ``detail`` is what is varied.
+        All tests with the existing sensors, the most informative first; ``detail`` is what is varied.
     not_simulated : tuple of (str, str)
         Tests that could not be, and why.
     """
@@ -145,7 +145,7 @@ class MeasurementPlan:
 
     @cached_property
     def comparable(self) -> NDArray[np.bool_]:
-        """Pairs that are different effects, or places that a decision tells apart, (k, k)."""
+        """Pairs that are different effects, or places that a decision distinguishes, (k, k)."""
         return comparable_pairs(self.hypotheticals, self.machine.view)
 
 
@@ -174,14 +174,14 @@ def plan_measurement(
     asked: str,
     progress: Progress = lambda stage: None,
 ) -> MeasurementPlan:
-    """What a test and its sensors would tell, and which sensor or test would tell more.
+    """Predict the information of a test and its sensors, and which sensor or test would add most.
 
     Parameters
     ----------
     machine : DiagnosedMachine
-        On the test asked for, then on one recording of every schedule.
+        With the requested test first, then one recording of every schedule.
     asked : str
-        The test asked for, in words.
+        The requested test, in words.
     """
     masks = [~heldout_stamps(item)[0] for item in machine.recordings]
     predictor = Predictor(machine.fast, machine.recordings, masks, machine.effects)
@@ -257,7 +257,7 @@ def plan_measurement(
 
 
 def _interval_candidates(view: MachineView, duration: float) -> list[Candidate]:
-    """Unrecorded heat and cooling over the intervals that stand for all others, at every spot."""
+    """Unrecorded heat and cooling over the representative intervals, at every spot."""
     return [
         effect.over(view, spot, [(first * duration, last * duration)])
         for effect in interval_effects()
@@ -267,7 +267,7 @@ def _interval_candidates(view: MachineView, duration: float) -> list[Candidate]:
 
 
 def _places(machine: DiagnosedMachine, predictor: Predictor) -> tuple[Place, ...]:
-    """Where a further sensor can be put: probes that are not read, then other places."""
+    """Places for a further sensor: probes that are not read, then other places."""
     model, read = predictor.fast.model, predictor.recordings[0].probes
     if machine.is_network:
         return network_places(model.place_names, read)
@@ -280,7 +280,7 @@ def _places(machine: DiagnosedMachine, predictor: Predictor) -> tuple[Place, ...
 
 
 def _forms(variants: Sequence[Variant]) -> tuple[EffectForms, tuple[Hypothetical, ...]]:
-    """Which variants are forms of one effect at one place, and how likely each is."""
+    """Variants grouped as forms of one effect at one place, with the probability of each."""
     effects = catalogue()
     priors = np.exp(log_priors(variants, {name: effect.prior_weight for name, effect in effects.items()}))
     priors *= np.array([variant.candidate.likelihood for variant in variants])
@@ -306,7 +306,7 @@ def _forms(variants: Sequence[Variant]) -> tuple[EffectForms, tuple[Hypothetical
 
 
 def _means(predictor: Predictor, places: Sequence[Place]) -> Array:
-    """What a sensor at each place reads of the model's unknowns, (k, r)."""
+    """Weights of the model's unknowns in the reading of a sensor at each place, (k, r)."""
     model = predictor.fast.model
     rows = [
         model.probes[model.probe_names.index(place.name)] if place.is_probe else model.place(place.name)

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What one unit of a misdescription changes in one recording, at fixed temperatures of the machine.
+    """Changes in one recording per unit of a misdescription, at fixed temperatures of the machine.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Misdescription:
-    """One direction.
+    """One direction of misdescription.
 
     Attributes
     ----------

@@ -48,7 +48,7 @@ def with_misdescriptions(
     values: Mapping[str, float] = NO_VALUES,
     candidates: Sequence[Candidate] = (),
 ) -> Predictor:
-    """The same predictor with columns of the directions about runs with some values.
+    """Add columns of the directions, about runs with the given values, to a predictor.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def with_misdescriptions(
 
 
 def direction_columns(base: BaseRun, directions: Sequence[Misdescription]) -> tuple[Array, Array]:
-    """What a unit of each direction changes.
+    """Changes per unit of each direction.
 
     Returns
     -------

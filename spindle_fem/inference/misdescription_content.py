@@ -1,4 +1,4 @@
-"""What a diagnosis says about how the machine differs from its definition: ``misdescription`` of its file."""
+"""Deviations of the machine from its definition, as ``misdescription`` of the diagnosis file."""
 
 from __future__ import annotations
 

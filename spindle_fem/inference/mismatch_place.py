@@ -1,4 +1,4 @@
-"""Where and under which conditions a machine and its recordings differ."""
+"""Place and conditions of the differences between a machine and its recordings."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ def _centre(diagnosis: Diagnosis, component: str) -> tuple[float, float]:
 def component_shares(
     explanations: Sequence[Explanation], reported: Mapping[str, str]
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """Probability of every component that heat is missing there, and its best spot.
+    """Probability of missing heat in every component, and the best spot of each.
 
     Every spot counts the same beforehand. As for sets of effects, evidence
     counts a share of what it says, and less the more a spot explains.
@@ -216,8 +216,8 @@ def component_shares(
     >>> none = np.zeros(0)
     >>> items = [Explanation(name, 0, evidence, none, none, none) for name, evidence in
     ...          (("left", 4.0), ("right", 0.0), ("top", 0.0))]
-    >>> told, spots = component_shares(items, {"right": "rest", "top": "rest"})
-    >>> {name: round(value, 2) for name, value in told.items()}, spots["rest"]
+    >>> shares, spots = component_shares(items, {"right": "rest", "top": "rest"})
+    >>> {name: round(value, 2) for name, value in shares.items()}, spots["rest"]
     ({'left': 0.79, 'rest': 0.21}, 'right')
     """
     evidence: dict[str, float] = {}
@@ -239,7 +239,7 @@ def component_shares(
 def missing_heat(explanations: Sequence[Explanation], spot: str, predictor: Predictor) -> MissingHeat:
     """Mean over time and signed peak of the heat track at a spot, all recordings together.
 
-    A single step that stands out, as where readings are missing, is no peak.
+    An isolated step, as where readings are missing, is no peak.
     """
     total, duration, peak = 0.0, 0.0, 0.0
     for item in explanations:
@@ -256,7 +256,7 @@ def missing_heat(explanations: Sequence[Explanation], spot: str, predictor: Pred
 
 
 def heat_condition(explanations: Sequence[Explanation], spot: str, predictor: Predictor) -> str:
-    """What the machine does while heat is missing at a spot; empty where it never clearly is.
+    """Operating condition while heat is missing at a spot; empty if it never clearly is.
 
     With several recordings, that in which it is missing for longest. Heat
     counts beyond three standard errors and a quarter of its peak.
@@ -420,7 +420,7 @@ def smoothed_scores(times: Array, residual: Array, variance: Array, slow: SlowEr
 
 # ------------------------------------------------------------------ condition
 def conditions_in_words(recording: Recording, spans: Sequence[tuple[float, float]]) -> list[str]:
-    """What the machine does in each of some stretches: speed band, heating or cooling, temperature."""
+    """Operating condition in each of some stretches: speed band, heating or cooling, temperature."""
     if not spans:
         return []
     conditions = operating_conditions(recording)
@@ -453,7 +453,7 @@ def _words(conditions: Conditions, mask: NDArray[np.bool_]) -> str:
 
 
 def band_words(names: Sequence[str]) -> str:
-    """Speed bands that follow one another told as one.
+    """Merge adjacent speed bands.
 
     >>> band_words(["standstill", "0-1000 rpm", "1000-2000 rpm", "4000-5000 rpm"])
     'standstill, 0-2000 rpm and 4000-5000 rpm'
@@ -470,7 +470,7 @@ def band_words(names: Sequence[str]) -> str:
 
 
 def separating_temperature(recording: Recording, inside: NDArray[np.bool_]) -> str:
-    """``above 31 °C at SP01`` where that tells the stamps inside from those outside; else empty."""
+    """``above 31 °C at SP01`` if that separates the stamps inside from those outside; else empty."""
     best, words = tuned.SEPARATES, ""
     for column, name in enumerate(recording.temperature_names[: recording.temperature_count]):
         usable = recording.usable[:, column]

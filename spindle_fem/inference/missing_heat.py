@@ -1,7 +1,7 @@
 """Where and when heat is missing: regularised inversion of the residual, place by place.
 
-For every place the answer of all channels to heat that begins at each of a
-row of instants is marched through the linear model. From these answers follow
+For every place the response of all channels to heat that begins at each of a
+row of instants is marched through the linear model. From these responses follow
 
 - the heat over time at that one place which explains the residual best, as a
   Gaussian random walk whose size the evidence chooses, and how well it does;
@@ -39,7 +39,7 @@ SMALLEST_SETTLING = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Heat that comes or goes at one spot.
+    """Distribution of unknown heat, positive or negative, at one spot.
 
     Attributes
     ----------
@@ -66,12 +66,12 @@ class Pattern:
     source: str = ""
 
     def load(self, model: ThermalModel) -> Array:
-        """Where a unit of heat goes, (r,)."""
+        """Load of a unit of heat, (r,)."""
         load = np.mean([model.place(place) for place in self.places], axis=0)
         return load - model.place(self.other) if self.other else load
 
     def strength(self, base: BaseRun) -> tuple[Array | float, Array | float]:
-        """How much heat a unit is at both ends of every step, (G,) W."""
+        """Heat of one unit at both ends of every step, (G,) W."""
         if self.source:
             (row,) = base.predictor.fast.heat_rows(self.source)
             ends = base.run.friction_start[:, row], base.run.friction_end[:, row]
@@ -102,7 +102,7 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Onsets:
-    """Inner products of the answers to heat from each instant on, at one spot.
+    """Inner products of the responses to heat from each instant on, at one spot.
 
     Attributes
     ----------
@@ -173,7 +173,7 @@ def onset_answers(
     trust: Fit | None = None,
     workers: Workers | None = None,
 ) -> list[Onsets]:
-    """Inner products of all spots' answers about a fit.
+    """Inner products of all spots' responses about a fit.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def _onsets_of(
     recording: int,
     number: int,
 ) -> list[list[Onsets]]:
-    """Inner products of some spots' answers, by chunks that are marched together."""
+    """Inner products of some spots' responses, by chunks that are marched together."""
     base = BaseRun(problem.predictor, recording, fit.values, fit.candidates)
     grid = base.drive.grid
     onsets = np.linspace(grid[0], grid[-1], number + 1)[:-1]
@@ -383,7 +383,7 @@ def _gain(overlap: Array, size: Array, spread: float) -> Array:
 
 
 def conditions_of(times: Array, speed: Array, temperature: Array) -> list[str]:
-    """What the machine does at each time: standstill, heating, cooling or steady running.
+    """Operating condition at each time: standstill, heating, cooling or steady running.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What bridges the housing of a machine from outside: brackets, hoses and cables that no drawing shows."""
+"""External bridges to the housing of a machine: brackets, hoses and cables that no drawing shows."""
 
 from __future__ import annotations
 

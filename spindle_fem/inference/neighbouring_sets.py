@@ -23,7 +23,7 @@ def widened(search: Search) -> None:
                 members[position] = wider
                 if len({(c.effect, c.component) for c in members}) < len(members):
                     continue
-                # What the bearing had is a start for the set; its own names differ.
+                # The bearing's values are a start for the set, whose names differ.
                 values = hypothesis.fit.values
                 start = values | _renamed_values(candidate, wider, values)
                 tasks.append((tuple(members), start))
@@ -118,7 +118,7 @@ def _groups_of(search: Search, component: str) -> list[str]:
 
 
 def _sets_of(search: Search, candidate: Candidate) -> list[Candidate]:
-    """The same effect in the same form at the sets that a bearing belongs to."""
+    """The effect in the same form at the sets that a bearing belongs to."""
     groups = _groups_of(search, candidate.component)
     return [
         item

@@ -1,4 +1,4 @@
-"""What a roughly drawn network leaves open: small masses, laws not quite constant, a room not read."""
+"""Uncertainties of a coarsely defined network: small masses, laws not quite constant, a room not read."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ class RoomCourse:
 
 
 def room_modes(times: Array) -> list[tuple[float, Array]]:
-    """Independent courses of a room's temperature that nobody read, the largest first.
+    """Independent courses of an unrecorded room temperature, the largest first.
 
     A Gaussian process of zero mean: a daily swing whose size and phase wander over days, and weather and
     doors over hours; its Karhunen-Loève modes.

@@ -1,7 +1,7 @@
-"""Which sensor, place or test would best tell the remaining explanations apart.
+"""Sensor, place or test that would best distinguish the remaining explanations.
 
 Every explanation that is left predicts, with its own uncertain parameters, a
-Gaussian for the readings of every test. What a test is expected to tell is the
+Gaussian for the readings of every test. The expected information of a test is the
 mutual information between explanation and readings; it is bounded from below
 by the pairwise distances of the Gaussians.
 
@@ -44,21 +44,21 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Explanations that a test is to tell apart, the most probable ones.
+# Number of explanations that a test should distinguish, the most probable ones.
 MOST_HYPOTHESES = 3
 # Distance of the instants at which tests are compared, s, and their number at least and at most.
 SPACING = 300.0
 FEWEST_INSTANTS, MOST_INSTANTS = 12, 48
 # Options with this share of the best one's information are worth as much; the simplest of them is proposed.
 AS_GOOD = 0.9
-# A test that is expected to tell less than this, bits, does not separate the explanations.
+# A test with less expected information than this, bits, does not separate the explanations.
 HARDLY = 0.3
 EXISTING = "the sensors that are there"
 
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """One test with the sensors that are there, and perhaps one more.
+    """One test with the existing sensors, and perhaps one more.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Option:
 
     @property
     def effort(self) -> int:
-        """What it takes: a test, a sensor more, or both."""
+        """Effort: a test, a further sensor, or both."""
         return self.trial.effort + (0 if self.place is None else 2)
 
     @property
@@ -109,7 +109,7 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
     -------
     dict
         ``where``, ``quantity``, ``condition``, ``why``, ``expected_information``
-        (bits), ``between`` and ``options``: the proposed one, then the most telling first.
+        (bits), ``between`` and ``options``: the proposed one, then the most informative first.
     """
     rivals, weights, decided = rivals_of(diagnosis)
     if len(rivals) < 2:
@@ -163,13 +163,13 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def rivals_of(diagnosis: Diagnosis) -> tuple[list[Ranked], Array, bool]:
-    """Explanations to tell apart, their probabilities, and whether only one was left."""
+    """Explanations to distinguish, their probabilities, and whether only one was left."""
     judgement = diagnosis.judgement
     found = [judgement.chosen, *judgement.alternatives][:MOST_HYPOTHESES]
     decided = len(found) < 2
     if decided:
         others = [item for item in rank(diagnosis.hypotheses) if item.fit.keys != found[0].fit.keys]
-        # The same set with one effect more is no other explanation, and that nothing is missing is out.
+        # The same set plus one effect is not a different explanation, and "nothing missing" is excluded.
         others.sort(key=lambda item: (item.fit.keys > found[0].fit.keys, not item.fit.candidates))
         found += others[:1]
     weights = np.ones(len(found)) if decided else np.array([item.probability for item in found])
@@ -261,7 +261,7 @@ def _option(
     first, second = int(order[0]), int(order[1])
     difference = means[second] - means[first]
     spread = np.sqrt(0.5 * (np.diag(covariances[first]) + np.diag(covariances[second])))
-    # What a further sensor adds is told at that sensor.
+    # The gain of a further sensor is judged at that sensor.
     searched = np.abs(difference / spread)
     if place is not None:
         searched[: -size or None] = -1.0
@@ -319,7 +319,7 @@ def expected_information(weights: Array, distances: Array) -> float:
 
 
 def choose(options: Sequence[Option]) -> Option:
-    """The simplest of the options that tell nearly as much as the best; of these the clearest."""
+    """The simplest of the options with nearly the most information; of these the clearest."""
     new = [item for item in options if item.trial.name != AGAIN or item.place is not None]
     # A network whose inputs never change, all of whose nodes are read, can only be read again.
     new = new or list(options)
@@ -330,7 +330,7 @@ def choose(options: Sequence[Option]) -> Option:
 
 
 def shortlist(options: Sequence[Option], best: Option) -> list[Option]:
-    """Every test with the sensors that are there, and every further place in its most telling test."""
+    """Every test with the existing sensors, and every further place in its most informative test."""
     found: dict[str, Option] = {}
     for item in options:
         key = item.trial.name if item.place is None else item.place.name
@@ -347,13 +347,13 @@ def _merit(option: Option) -> tuple[float, float]:
 
 
 def timed_words(fits: Sequence[Fit]) -> str:
-    """What is taken for granted of effects that come and go; empty where there are none."""
+    """Assumption about effects that come and go; empty if there are none."""
     timed = any(in_intervals(effect_of(c.effect), c) for fit in fits for c in fit.candidates)
     return " Unrecorded heat or cooling is taken to come and go as it did in the recording." if timed else ""
 
 
 def lead_words(diagnosis: Diagnosis, decided: bool) -> str:
-    """How far the data are from an answer already; empty where several explanations are left."""
+    """How nearly the data decide already; empty if several explanations are left."""
     if diagnosis.judgement.verdict == "unexplained":
         return "Nothing explains the recording; this would tell apart what comes nearest. "
     return "The data have decided; this would confirm it. " if decided else ""

@@ -77,7 +77,7 @@ def observe(
         Width of the bins of each recording, as :func:`channel_bins` takes it.
     rows : sequence of float, optional, [s]
         Time over which each row of a recording is a mean; predictions are averaged as the readings were.
-        Without it a prediction at a bin's mean time stands for it.
+        Otherwise the prediction at a bin's mean time is used.
     """
     found = []
     for number, (recording, mask, grid, width) in enumerate(zip(recordings, use, grids, widths, strict=True)):

@@ -40,7 +40,7 @@ MOST_STAMPS = 3_000
 
 @dataclass(frozen=True, slots=True)
 class DiagnosedMachine:
-    """What a diagnosis works on.
+    """Machine, recordings and settings of a diagnosis.
 
     Attributes
     ----------
@@ -166,9 +166,9 @@ def _open_network(
 
 
 def with_growth(machine: DiagnosedMachine) -> DiagnosedMachine:
-    """The machine with displacements among the readings that are to be explained, where it has geometry.
+    """The machine with displacements among the readings to explain, if it has geometry.
 
-    The view stays that of the temperatures: what is usual and what ails sensors is asked of them alone.
+    The view stays that of the temperatures: usual sizes and sensor effects follow from them alone.
     """
     if machine.is_network:
         return machine
@@ -182,7 +182,7 @@ def with_growth(machine: DiagnosedMachine) -> DiagnosedMachine:
 
 
 def with_network(machine: DiagnosedMachine, spec: NetworkMachineSpec) -> DiagnosedMachine:
-    """The same recordings on another written network."""
+    """The recordings with another written network."""
     network = build_network(spec.network)
     fast = fast_network(network, spec)
     has = frozenset(f"{entry.effect} @ {entry.component}" for entry in spec.effects)

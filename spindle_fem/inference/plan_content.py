@@ -1,4 +1,4 @@
-"""What a plan of a measurement says, as ``plan.json`` holds it."""
+"""Content of a measurement plan, as stored in ``plan.json``."""
 
 from __future__ import annotations
 
@@ -136,14 +136,14 @@ def words_of(item: Hypothetical) -> str:
 
 
 def confused_with(plan: MeasurementPlan, index: int) -> list[int]:
-    """Effects that one cannot be told from at its usual size, the likest first."""
+    """Effects indistinguishable from one at its usual size, the likeliest first."""
     apart = plan.separation.told_from[index]
     found = [j for j in range(len(apart)) if plan.comparable[index, j] and not apart[j] <= 1.0]
     return sorted(found, key=lambda j: plan.separation.information[index, j])
 
 
 def summary(plan: MeasurementPlan, sensors: Sequence[Sensor], compared: float) -> list[str]:
-    """What to read from it, in sentences; ``compared`` as :func:`plan_content` takes it."""
+    """Conclusions in sentences; ``compared`` as :func:`plan_content` takes it."""
     items, now = plan.hypotheticals, plan.asked
     names = [item.name for item in sensors]
     shown = ", ".join(names[:-1]) + f" and {names[-1]}" if len(names) > 1 else names[0]

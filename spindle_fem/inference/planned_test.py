@@ -1,4 +1,4 @@
-"""A test that nobody has run yet, as the recording that it would leave."""
+"""A test that has not been run yet, as the recording that it would produce."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ NOISE, LENGTH = 0.1, 4.0 * 3600.0
 TIME_CONSTANTS, SHORTEST, LONGEST = 4.0, 600.0, 24.0 * 3600.0
 # Distance of readings, s, and most of them: longer tests are read less often.
 SAMPLE, MOST_SAMPLES = 30.0, 2_000
-# Tests that are compared with the one asked for are no longer than this, s.
+# Longest test compared with the requested one, s.
 LONGEST_COMPARED = 8.0 * 3600.0
 ROOM = ZERO_CELSIUS_K + 20.0
 # Inputs of a network whose size nothing says warm its hottest node by this in the end, others at rest, K.
@@ -71,7 +71,7 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """What drives a machine in a test, and what it holds.
+    """Inputs of a machine in a test, and their standard values.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Conditions:
 
     @property
     def default_length(self) -> float:
-        """How long a test should last, s."""
+        """Default duration of a test, s."""
         if self.network is None:
             return LENGTH
         nodes = self.network.n_nodes
@@ -136,7 +136,7 @@ class Conditions:
 def conditions_of(
     machine: str, overrides: Sequence[str], given: Mapping[str, tuple[float, str]], *, recorded: bool
 ) -> Conditions:
-    """Inputs of a machine at full load: what is given, else what its definition says.
+    """Inputs of a machine at full load: as given, else from its definition.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def _require_known(
 
 
 def recording_of(conditions: Conditions, schedule: Schedule, sensors: Sequence[Sensor]) -> Recording:
-    """What a test would leave, every reading still at the temperature of the start."""
+    """Recording that a test would produce, every reading still at the temperature of the start."""
     edges = np.cumsum([0.0, *(length for length, _ in schedule.stages)])
     step = max(SAMPLE, schedule.length / MOST_SAMPLES)
     times = np.unique(np.round(np.append(np.arange(0.0, schedule.length, step), edges), 6))
@@ -263,7 +263,7 @@ def recording_of(conditions: Conditions, schedule: Schedule, sensors: Sequence[S
 
 
 def with_sensors(recording: Recording, sensors: Sequence[Sensor], start: float) -> Recording:
-    """A recording as these sensors would have read it, at the temperature of its own start throughout.
+    """A recording as read by these sensors, at the temperature of its own start throughout.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What every channel of one recording should read, with derivatives and the states it comes from."""
+"""Predicted readings of every channel of one recording, with derivatives and the underlying states."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class Prediction:
     temperature : (G + 1, c) ndarray, [K]
         In the order of the recording's channels, sensor effects included.
     sensitivity : (G + 1, c, p) ndarray
-        To the coordinates asked for.
+        By the requested coordinates.
     states : (G + 1, r) ndarray
         Unknowns of the model.
     run : TransientRun or None
         Whose states they are; None at the stamps.
     tangents : (G + 1, r, q) ndarray or None
-        Derivatives of the states to the coordinates that enter the run; None where none were asked for.
+        Derivatives of the states by the coordinates that enter the run; None if none were requested.
     columns : (p,) int ndarray
-        Which of them each coordinate asked for is, -1 for none.
+        Index in the tangents of each requested coordinate, -1 for none.
     """
 
     temperature: Array
@@ -40,7 +40,7 @@ class Prediction:
     columns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def moved(self, move: Array) -> Prediction:
-        """The same run with its states moved to first order with the coordinates (p,)."""
+        """The run with its states moved to first order with the coordinates (p,)."""
         if self.tangents is None or self.run is None or self.run.dynamic is None:
             # A linear run is solved in one go: a nearer start gains nothing.
             return self
@@ -50,7 +50,7 @@ class Prediction:
         return replace(self, states=self.states + self.tangents @ own, tangents=None)
 
     def slopes_at(self, places: Array) -> Array:
-        """Derivatives (G + 1, n, p) of the temperatures of places (n, r) to the coordinates asked for."""
+        """Derivatives (G + 1, n, p) of the temperatures of places (n, r) by the requested coordinates."""
         found = np.zeros((len(self.states), len(places), len(self.columns)))
         if self.tangents is not None:
             inside = self.columns >= 0

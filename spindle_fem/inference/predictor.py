@@ -1,6 +1,6 @@
-"""What every channel of some recordings should read by a machine's fast model, and derivatives.
+"""Predicted readings of every channel of some recordings by a machine's fast model, and derivatives.
 
-One predictor serves everything: calibration and simulation ask it for every
+One predictor serves everything: calibration and simulation use it for every
 stamp of a recording; a diagnosis, which runs it thousands of times, on steps
 of a minute from one change of the inputs to the next.
 """
@@ -114,7 +114,7 @@ class Predictor:
         self.heldout = self._observe([~mask for mask in self.use])
 
     def _drive(self, recording: Recording) -> Drive:
-        """Inputs of a recording, and the times at which its channels are told."""
+        """Inputs of a recording, and the times at which its channels are predicted."""
         if self.at_stamps:
             own = self.fast.inputs.drive(recording) if self.is_network else None
             return drive_of_recording(self.fast.spec, recording) if own is None else own
@@ -136,7 +136,7 @@ class Predictor:
         return observe(self.recordings, masks, grids, widths, rows)
 
     def with_model(self, fast: FastModel, same_within: float = 0.0) -> Predictor:
-        """The same recordings on another reduction of the same machine."""
+        """The predictor with another reduction of the same machine."""
         found = Predictor(
             fast,
             self.recordings,
@@ -149,7 +149,7 @@ class Predictor:
         return found.misdescribed_like(self).with_unseen(self.unseen)
 
     def with_unseen(self, power: Sequence[Array]) -> Predictor:
-        """The same knowing what rarely read inputs of each recording leave open.
+        """The predictor with the uncertainty of rarely read inputs of each recording.
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class Predictor:
     def misdescribed_by(
         self, directions: Sequence[Misdescription], columns: Mapping[tuple[int, str], Array]
     ) -> Predictor:
-        """The same with directions in which the machine may differ from its definition.
+        """The predictor with directions in which the machine may differ from its definition.
 
         Parameters
         ----------
@@ -179,7 +179,7 @@ class Predictor:
         return self._columns.get((number, coordinate))
 
     def misdescribed_like(self, other: Predictor) -> Predictor:
-        """The same with the directions of another predictor of the same recordings."""
+        """The predictor with the directions of another predictor of the same recordings."""
         return self.misdescribed_by(other.misdescribed, other._columns)
 
     # ------------------------------------------------------------------ what is uncertain
@@ -234,7 +234,7 @@ class Predictor:
     def start(
         self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
     ) -> float | Start:
-        """Where a recording begins: a uniform temperature [K], or that of every node of a network."""
+        """Initial state of a recording: a uniform temperature [K], or that of every node of a network."""
         if self.is_network:
             return self.fast.inputs.start(
                 self.recordings[number],
@@ -249,7 +249,7 @@ class Predictor:
         return float(np.mean(list(self.recordings[number].first_readings().values())))
 
     def _run_name(self, number: int, name: str, outside: Sequence[str]) -> str | None:
-        """What a coordinate is called in the run of one recording; None where it does not enter."""
+        """Name of a coordinate in the run of one recording; None if it does not enter."""
         if name in outside or name.startswith(FIRST_ORDER):
             return None
         if name.startswith(START_PREFIX):
@@ -326,7 +326,7 @@ class Predictor:
         derivatives: Sequence[str] = (),
         near: Prediction | None = None,
     ) -> Prediction:
-        """What every channel of one recording should read.
+        """Predicted readings of every channel of one recording.
 
         Parameters as for :meth:`transient`; ``derivatives`` may also name
         factors of candidates (``effect:<name>``) and parameters of readings.
@@ -382,7 +382,7 @@ class Predictor:
     def _unseen(
         self, number: int, told: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
     ) -> None:
-        """What happened in gaps of the recording, and how the machine differs, to first order, in place."""
+        """Add first-order changes by events in gaps and deviations of the machine, in place."""
         known, slopes = self.directions_of(number)
         if known:
             told.temperature[:] += slopes @ [values.get(name, 0.0) for name in known]
@@ -423,7 +423,7 @@ class Predictor:
     def read(
         self, number: int, candidates: Sequence[Candidate], values: Mapping[str, float], temperature: Array
     ) -> Array:
-        """What the channels tell where their places have the temperatures (G + 1, c)."""
+        """Readings of the channels if their places have the temperatures (G + 1, c)."""
         told = Prediction(temperature.copy(), np.zeros((*temperature.shape, 0)), np.zeros(0))
         for reading in _readings(candidates):
             self._read(number, reading, told, values, ())

@@ -1,4 +1,4 @@
-"""From a machine and its recordings to a problem that can be searched."""
+"""Set up a problem that can be searched from a machine and its recordings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import ChannelBins, SlowError, likely_slow_error, slow_errors_of
 
 Array = NDArray[np.float64]
-# Of the bin means of every observation, [K].
+# Residuals of the bin means of every observation, [K].
 Residuals = list[tuple[ChannelBins, Array]]
 
 RADIAL = f".{DIRECTIONS[0]}"
@@ -36,7 +36,7 @@ CALIBRATION_ROUNDS = 3
 
 @dataclass(frozen=True, slots=True)
 class Calibrated:
-    """What the calibration recordings told.
+    """Result of the calibration recordings.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ def _direction(item: Misdescription) -> Coordinate:
 
 
 def start_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:
-    """What is uncertain of each recording: temperatures at its start, inputs within gaps, its clocks."""
+    """Uncertain quantities of each recording: temperatures at its start, inputs within gaps, its clocks."""
     starts = [coordinate_of(prior, THETA_BOUND) for prior in predictor.starts()]
     # Anywhere in the gap: a uniform distribution's mean, spread and ends.
     ends = float(np.sqrt(3.0))
@@ -170,10 +170,10 @@ def with_own_noise(
     residuals: Callable[[Fit], list[tuple[ChannelBins, Array]]],
     hypotheses: Sequence[Hypothesis],
 ) -> list[Hypothesis]:
-    """Each hypothesis with the slow error that is most probable under it.
+    """Each hypothesis with its own most probable slow error.
 
-    How large the error is that nobody explains is as unknown as the parameters: held at what the best set
-    leaves it would make everything else look impossible.
+    The size of the unexplained error is as unknown as the parameters: fixed at the residual of the best set
+    it would make everything else look impossible.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def with_own_noise(
 
 
 def _slow_choices(predictor: Predictor) -> dict[str, Any]:
-    """What the slow error is chosen from, as :func:`likely_slow_error` takes it."""
+    """Choices for the slow error, as :func:`likely_slow_error` takes them."""
     if not predictor.is_network:
         displaced = any(item.bins.is_relative for item in predictor.observations)
         # None of the larger ones is likely of a temperature before any reading.
@@ -251,7 +251,7 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
     prior = known_before(earlier)
     for _ in range(CALIBRATION_ROUNDS):
         if fit is not None:
-            # What directions do is told about the numbers that were fitted.
+            # Directions are linearised about the fitted numbers.
             earlier = with_misdescriptions(earlier, earlier.misdescribed, fit.values)
         problem = Problem(earlier, prior, slow, earlier.observations)
         fit = problem.fit((), None if fit is None else fit.values)
@@ -273,9 +273,9 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
 
 
 def _as_stated(before: Array, after: Array) -> Array:
-    """Covariance of what a calibration told, as wide as intervals are stated.
+    """Covariance after a calibration, widened like stated intervals.
 
-    What the calibration added to what was known before counts less, since a model that is not exact has other
+    The information gained by the calibration counts less, since a model that is not exact has other
     best parameters in another duty.
     """
     known, learned = np.linalg.inv(before), np.linalg.inv(after)

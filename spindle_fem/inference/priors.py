@@ -1,4 +1,4 @@
-"""What is known of a machine's uncertain parameters before any data."""
+"""Prior knowledge of a machine's uncertain parameters."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class SlowError:
     channels: tuple[tuple[int, float, float], ...] = ()
 
     def of(self, channel: int | None) -> SlowError:
-        """That of one channel."""
+        """Slow error of one channel."""
         for number, sigma, time in self.channels:
             if number == channel:
                 return SlowError(sigma, time)
@@ -56,7 +56,7 @@ class SlowError:
 
     @classmethod
     def each(cls, channels: Mapping[int, SlowError]) -> SlowError:
-        """One for every channel, by the key of its bins; the common one is that of temperatures."""
+        """A slow error for every channel, by the key of its bins; the common one is that of temperatures."""
         warm = [own for key, own in channels.items() if key >= 0] or list(channels.values())
         sigma = float(np.sqrt(np.mean([item.sigma**2 for item in warm])))
         time = float(np.exp(np.mean([np.log(item.time) for item in warm])))
@@ -99,7 +99,7 @@ class ChannelBins:
 
     @property
     def is_relative(self) -> bool:
-        """Whether a constant of its own is free: a displacement counts from where its sensor was set."""
+        """Whether it has a free constant: a displacement counts from its sensor's unknown zero."""
         return self.key < 0
 
     def average(self, values: Array) -> Array:
@@ -206,7 +206,7 @@ class Whitener:
             total = variance + own
             gain[step], self._scale[step] = variance / total, np.sqrt(total)
             variance *= own / total
-        # What is expected of a bin: kept of what was before, corrected by its gain. One row a bin.
+        # Expected value of a bin: share kept of the previous one, corrected by its gain. One row per bin.
         self._corrected = (kept[1:] * gain[:-1])[:, None]
         self._expecting = np.ones((2, len(kept)))
         self._expecting[1, :-1] = -kept[1:] * (1.0 - gain[:-1])
@@ -284,7 +284,7 @@ def slow_errors_of(
     Others as :func:`likely_slow_error` has them.
     """
     choices = [SlowError(sigma, time) for sigma in sigmas for time in times]
-    # Temperatures together, where they are not asked for one by one, and every displacement by itself.
+    # Temperatures together, unless requested one by one, and every displacement by itself.
     group = [bins.key if by_channel or bins.is_relative else COMMON for bins, _ in residuals]
     keys = list(dict.fromkeys(group))
     fits = residuals[0][1].shape[1]

@@ -78,7 +78,7 @@ def with_changes_amid(recording: Recording) -> Recording:
 
 @dataclass(frozen=True, slots=True)
 class Hidden:
-    """What may have happened between two times.
+    """Unrecorded event between two times.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Hidden:
 def hidden_in(
     recording: Recording, pieces: Sequence[tuple[float, float]], sets: Sequence[str]
 ) -> tuple[Hidden, ...]:
-    """What may have happened in pieces of gaps, beyond what the inputs beside them say.
+    """Possible events in pieces of gaps, beyond what the inputs beside them indicate.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
 
 
 def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, float, float]]) -> Array:
-    """What the states of a run gain for each second that an input changed earlier, (G, r, n).
+    """Change of the states of a run per second that an input changed earlier, (G, r, n).
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, fl
 
 
 def hidden_forcing(run: TransientRun, fast: FastModel, hidden: Sequence[Hidden]) -> Array:
-    """What the states of a run gain from what happened in pieces of gaps, (G, r, n) K.
+    """Change of the states of a run by events in pieces of gaps, (G, r, n) K.
 
     Parameters
     ----------

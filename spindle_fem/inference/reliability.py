@@ -1,4 +1,4 @@
-"""How often a set with such evidence is the right one, by experience with concealed machines.
+"""Probability that a set with given evidence is the right one, by experience with concealed machines.
 
 Evidence compares the laws of the catalogue with each other, as if one of them
 were exact. Real laws differ from them, and what a strong effect's inexact law
@@ -38,14 +38,14 @@ def share_of_last(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float
 
 
 def gain_of_more(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float:
-    """What the best set with more effects makes the data likelier by (natural logarithm), at least 0."""
+    """Largest gain in log likelihood (natural logarithm) by a set with more effects, at least 0."""
     size = len(chosen.fit.candidates)
     larger = [h.misfit for h in hypotheses if len(h.fit.candidates) > size]
     return max(0.0, 0.5 * (chosen.misfit - min(larger))) if larger else 0.0
 
 
 def features(probability: float, size: int, share: float, more: float) -> list[float]:
-    """What a set's reliability is told by: a constant, and what the coefficients of experience multiply.
+    """Features that the coefficients of experience multiply to give a set's reliability, first a constant.
 
     Parameters as for :func:`reliable`.
 

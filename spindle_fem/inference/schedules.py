@@ -41,7 +41,7 @@ class Schedule:
 
     @property
     def length(self) -> float:
-        """Of all stages, [s]."""
+        """Length of all stages, [s]."""
         return sum(length for length, _ in self.stages)
 
 
@@ -167,7 +167,7 @@ def network_schedules(ranges: Mapping[str, tuple[float, float]], hold: float) ->
 def standard_schedules(
     usual: Mapping[str, float], driven: Sequence[str], length: float
 ) -> dict[str, Schedule]:
-    """The tests that every machine knows, of a given length: heat-up, steps, cool-down.
+    """Standard tests of a given length, available for every machine: heat-up, steps, cool-down.
 
     Parameters
     ----------

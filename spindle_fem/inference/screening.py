@@ -1,4 +1,4 @@
-"""Which few of many candidates explain what is left, to first order."""
+"""Select the few of many candidates that explain the residual, to first order."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from spindle_fem.inference.worker_processes import Workers
 
 Array = NDArray[np.float64]
 
-# Shares of the variants whose answers are worked out side by side.
+# Number of pieces into which variants are divided to compute their responses in parallel.
 PIECES = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Screened:
-    """Candidates against what one fit leaves.
+    """Candidates compared with the residual of one fit.
 
     Attributes
     ----------
     gram : (m, m) ndarray
-        Inner products of their answers, less what the machine's own coordinates absorb.
+        Inner products of their responses, less what the machine's own coordinates absorb.
     data : (m,) ndarray
         With the data.
     total : float
@@ -58,7 +58,7 @@ class Screened:
     families: Mapping[str, str] = field(default_factory=dict)
     boxed: BoxedColumns | None = None
     base: float = 0.0
-    # Sets of each size that were evaluated, and their gains: asked for several times and slow within bounds.
+    # Sets of each size that were evaluated, and their gains: used several times and slow within bounds.
     _known: dict[int, tuple[NDArray[np.int64], Array]] = field(default_factory=dict, repr=False)
 
     def singles(self) -> Array:
@@ -218,7 +218,7 @@ def screen(
     trust: Fit | None = None,
     workers: Workers | None = None,
 ) -> Screened:
-    """Answers of all variants about a fit, and their inner products.
+    """Responses of all variants about a fit, and their inner products.
 
     Parameters
     ----------
@@ -228,12 +228,12 @@ def screen(
     families : mapping of component to str
         As :class:`Screened` has them.
     trust : Fit or None
-        Fit without the variants that gains count from, and whose residuals tell which readings went
-        astray; None for the first one.
+        Fit without the variants that gains count from, and whose residuals show which readings are
+        outliers; None for the first one.
     workers : Workers or None
-        Processes that work out the answers; the result does not depend on it.
+        Processes that compute the responses; the result does not depend on it.
     """
-    # As many pieces whether or not there are workers for them, so that the result is the same.
+    # The same pieces with or without workers, so that the result is the same.
     pieces = [tuple(variants[first::PIECES]) for first in range(PIECES)]
     *answers, linear = (workers or Workers()).done(
         problem,
@@ -257,7 +257,7 @@ def screen(
 
 
 def _answers(problem: Problem, fit: Fit, variants: Sequence[Variant]) -> Array:
-    """Whitened answers of all recordings to variants, (n, m)."""
+    """Whitened responses of all recordings to variants, (n, m)."""
     return problem.whitened(
         [
             BaseRun(problem.predictor, number, fit.values, fit.candidates).responses(variants)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 DRAWS = 4
 # Standard deviations of the prior to either side of which they are drawn.
 DRAWN_SIGMAS = 2.0
-# Sensitivities join the basis at every fourth step: neighbours are alike.
+# Sensitivities join the basis at every fourth step: neighbours are similar.
 EVERY_TANGENT = 4
 # Rates of change of the heat at a place, 1/s: steady, and over about an hour and five minutes.
 PLACE_RATES = (0.0, 3e-4, 3e-3)
@@ -37,7 +37,7 @@ def searched_predictor(
     Parameters
     ----------
     candidates : sequence of Candidate
-        What will be asked, beside heat at every spot of the view.
+        Candidates of the search, beside heat at every spot of the view.
     read : sequence of str
         Further places that will be read.
     """
@@ -54,7 +54,7 @@ def searched_predictor(
 def on_search_basis(
     predictor: Predictor, names: Sequence[str], places: Sequence[str], contacts: Sequence[str] = ()
 ) -> Predictor:
-    """The same recordings on the smaller basis that they need.
+    """The recordings on the smaller basis that they need.
 
     States and their sensitivities of every recording, with the machine's
     parameters at their prior values and two standard deviations to either

@@ -27,7 +27,7 @@ def run_search(search: Search) -> list[Hypothesis]:
     search.progress("diagnosis: screening")
     starts = [(null, *search.screened(null))]
     if null.reduced_misfit > tuned.DISTORTED**2:
-        # What is missing has pulled the parameters far off; as they are known they are nearer the truth.
+        # Missing physics has pulled the parameters far off; the prior values are nearer the truth.
         known = search.problem.fit(iterations=0)
         starts.append((known, *search.screened(known, null)))
     # The last start is the best one.
@@ -69,9 +69,9 @@ def run_search(search: Search) -> list[Hypothesis]:
 
 
 def _beside(search: Search) -> None:
-    """What else there is beside the best set, as long as that leaves something and becomes better.
+    """Look for further effects beside the best set, as long as a residual is left and they improve it.
 
-    Laws that stand out hide what switches beside them, and the other way round: either is looked for again
+    Strong laws hide what switches beside them, and vice versa: either is searched again
     once the other is known.
     """
     best = search.ranked()[0]

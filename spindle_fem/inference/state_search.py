@@ -1,9 +1,9 @@
-"""Hypotheses of what switches at times nobody recorded: found, fitted and followed again in turn.
+"""Hypotheses of states that switch at unrecorded times: found, fitted and followed again in turn.
 
-The course of a state and the parameters of the machine are found in turn: the course that explains what a fit
-leaves, the fit with heat or cooling on in just these intervals, the course about that fit, as long as it
-gains. A set with a state has one more free number than without; what the choice of its course costs is its
-likelihood over that of all courses under the fitted chain.
+The course of a state and the parameters of the machine are found in turn: the course that explains the
+residual of a fit, the fit with heat or cooling on in just these intervals, the course about that fit, as long
+as the likelihood grows. A set with a state has one more free number than without; the cost of choosing its
+course is its likelihood over that of all courses under the fitted chain.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ MOSTLY_INSIDE, TELLS, ONLY = 0.75, 0.1, 0.97
 
 @dataclass(frozen=True, slots=True)
 class StatePlace:
-    """Where something may switch: an effect, its spot, and the recording."""
+    """Place of a possible switching state: an effect, its spot, and the recording."""
 
     effect: IntervalEffect
     pattern: Pattern
@@ -86,7 +86,7 @@ def add_states(search: Search, fit: Fit, number: int = PLACES_SETTLED) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """A hidden state as all readings tell it, those that are held out from fits included.
+    """A hidden state inferred from all readings, including those held out from fits.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Told:
 
     @property
     def words(self) -> str:
-        """When it is on, as a sentence; empty where no input says so."""
+        """Times when it is on, as a sentence; empty if no input indicates them."""
         if not self.gate:
             return ""
         often = "only" if self.inside > ONLY else "mostly"
@@ -121,7 +121,7 @@ class Told:
 
 
 def told_states(search: Search, problem: Problem, fit: Fit) -> dict[str, Told]:
-    """Every hidden state of a fit as all readings tell it, by the name of its amplitude."""
+    """Every hidden state of a fit inferred from all readings, by the name of its amplitude."""
     found = {}
     for candidate in fit.candidates:
         if not search.is_hidden_state(candidate):
@@ -202,7 +202,7 @@ def _settle_intervals(search: Search, fit: Fit, candidate: Candidate) -> None:
     best = max(_courses(search, base, readings, place), key=lambda course: course.log_evidence, default=None)
     if best is not None:
         settle(search, fit, place, best, candidate)
-        # Laws may have stood in for what intervals miss of the state.
+        # Laws may have compensated for parts of the state that the intervals miss.
         if rest:
             settle(search, search.problem.fit(), place, best)
 

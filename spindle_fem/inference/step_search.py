@@ -40,7 +40,7 @@ CHANGES_TRIED = 3
 
 @dataclass(frozen=True, slots=True)
 class StepPlace:
-    """Where levels may change, and at how many instants."""
+    """Place where levels may change, and the number of instants."""
 
     effect: IntervalEffect
     pattern: Pattern
@@ -70,7 +70,7 @@ def add_steps(search: Search, fit: Fit) -> None:
                 found.append((changes.gain, effect, onsets))
     found.sort(key=lambda item: -item[0])
     fair = [item for item in found if item[0] > tuned.FAIR_SHARE * found[0][0]]
-    # Heat and cooling are much alike to first order: the second place is another effect's where there is one.
+    # Heat and cooling are similar to first order: the second place is another effect's if there is one.
     others = [item for item in fair if item[1] is not fair[0][1]]
     for _, effect, onsets in [*fair[:1], *others, *fair[1:]][:PLACES_SETTLED]:
         _settle(search, fit, effect, onsets)
@@ -119,10 +119,10 @@ def _settle(search: Search, fit: Fit, effect: IntervalEffect, onsets: Onsets) ->
 
 
 def _simplest(search: Search, problem: Problem, fit: Fit, place: StepPlace, found: Hypothesis) -> Hypothesis:
-    """Changes left out one after the other, as long as those that are left say nearly as much.
+    """Leave out changes one after the other as long as the rest explain nearly as much.
 
-    A model that is not exact leaves a residual in proportion to what the levels do, which a further change
-    may always fit a little.
+    A model that is not exact leaves a residual in proportion to the effect of the levels, which a further
+    change may always fit a little.
     """
     nothing = problem.fit(fit.candidates, fit.values, iterations=0).log_evidence
     least = tuned.LEAST_SHARE_OF_A_CHANGE * max(0.0, found.fit.log_evidence - nothing)
@@ -256,7 +256,7 @@ def _fitted(
 
 
 def _paid(problem: Problem, place: StepPlace, intervals: Sequence[tuple[float, float]]) -> float:
-    """What the choice of the changes costs, as a logarithm; levels from the start or to the end are none."""
+    """Cost of choosing the changes, as a logarithm; levels from the start or to the end cost nothing."""
     begin, *_, end = problem.predictor.drives[place.recording].grid
     near = SHORTEST * (end - begin)
     edges = {edge for pair in intervals for edge in pair if begin + near < edge < end - near}
@@ -292,7 +292,7 @@ def _again(search: Search, problem: Problem, fit: Fit, effect: IntervalEffect, o
 
 
 def _at(times: Array, edge: float) -> Array:
-    """Weights of the row of instants that stand for a step between two of them; none after the last."""
+    """Weights of the instants that represent a step between two of them; none after the last."""
     weights = np.zeros(len(times))
     if edge >= times[-1] + (times[-1] - times[-2]):
         return weights

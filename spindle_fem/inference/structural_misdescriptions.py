@@ -1,4 +1,4 @@
-"""How a machine with geometry may differ in what drawings and mounting leave open."""
+"""Possible deviations of a machine with geometry that drawings and mounting leave open."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from spindle_fem.model.reduced.structural_model import StructuralModel, structur
 
 Array = NDArray[np.float64]
 
-# Unit in which a report tells of a direction, and its size in the model's.
+# Unit in which a report states a direction, and its size in the model's unit.
 TOLD_IN = {"m": ("mm", 1e-3)}
 # Columns of all directions (G + 1, c, n), which one march gives together.
 _known: WeakKeyDictionary[BaseRun, dict[str, Array]] = WeakKeyDictionary()
@@ -27,7 +27,7 @@ _models: WeakKeyDictionary[FastModel, StructuralModel] = WeakKeyDictionary()
 
 @dataclass(frozen=True, slots=True)
 class StructuralChange:
-    """What some units of a direction change of the readings."""
+    """Change of the readings by some units of a direction."""
 
     name: str
     amount: float = 1.0

@@ -1,4 +1,4 @@
-"""Whether a recording says enough to be diagnosed at all."""
+"""Whether a recording has enough information to be diagnosed at all."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def says_too_little(machine: DiagnosedMachine) -> str:
 
 
 def prior_factor(predictor: Predictor) -> float:
-    """How much quicker than nominal the priors allow a machine to be (95 % bound), 1 for what is known."""
+    """Factor (95 % bound) by which the priors allow a machine to be quicker than nominal, at least 1."""
     sigmas: dict[str, list[float]] = {"capacity": [], "conductance": []}
     if predictor.is_network:
         for prior in predictor.uncertain():
@@ -76,7 +76,7 @@ def prior_factor(predictor: Predictor) -> float:
 
 
 def response_time(predictor: Predictor) -> float:
-    """Time in which the probes answer a step of all heat by 63 %, the median over the probes [s].
+    """Time in which the probes reach 63 % of the response to a step of all heat, median over the probes [s].
 
     From the modes of the machine at its mean operating point.
     """

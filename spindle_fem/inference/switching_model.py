@@ -1,11 +1,11 @@
-"""Something that is on or off at times nobody recorded: a linear model with a state that switches.
+"""Something that is on or off at unrecorded times: a linear model with a state that switches.
 
-What is read is the sum of what is known, of what a hidden state adds through a linear model, of what
-uncertain coordinates add, of a slow error of each channel and of white noise. Given the course of the state
-all of it is linear and Gaussian, so that a Kalman filter tells how likely a course is, coordinates and slow
-errors integrated out. Its gains do not depend on the course: many courses are followed side by side, each
-with its own mean, and those that differ only in what lies before their last two changes are joined. Nothing
-is approximated within a course; only unlikely ones are dropped.
+A reading is the sum of the known part, the contribution of a hidden state through a linear model, that
+of uncertain coordinates, a slow error of each channel and white noise. Given the course of the state all
+of it is linear and Gaussian, so that a Kalman filter gives the likelihood of a course, coordinates and
+slow errors integrated out. Its gains do not depend on the course: many courses are followed side by
+side, each with its own mean, and those that differ only in what lies before their last two changes are
+joined. Nothing is approximated within a course; only unlikely ones are dropped.
 
 Source: Doucet, Gordon & Krishnamurthy (2001), IEEE Trans. Signal Processing 49, 613-624 (filters of linear
 models that jump); Fearnhead & Clifford (2003), J. R. Statist. Soc. B 65, 887-899 (keeping the most likely
@@ -36,7 +36,7 @@ USUAL_STAY = 50.0
 
 @dataclass(frozen=True, slots=True)
 class LinearAnswer:
-    """How a linear model answers to something of unit size that is on.
+    """Response of a linear model to something of unit size that is on.
 
     Attributes
     ----------
@@ -63,14 +63,14 @@ class LinearAnswer:
 
     @property
     def largest(self) -> float:
-        """Size that settles what it acts on within a step: more of it says no more, and would overshoot."""
+        """Size that settles the places it acts on within a step; larger ones would overshoot."""
         settled = float(np.trace(self.loss, axis1=1, axis2=2).max())
         return 1.0 / settled if settled > 0.0 else np.inf
 
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What is left of readings at the ends of steps, and what may explain it beside the hidden state.
+    """Residuals of readings at the ends of steps, and other explanations beside the hidden state.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Chain:
 
     @classmethod
     def usual(cls, condition: Whole) -> Chain:
-        """Before any data."""
+        """Prior chain, before any data."""
         number = int(condition.max(initial=0)) + 1
         rate = np.full(number, 1.0 / USUAL_STAY)
         return cls(rate, rate.copy(), condition)
@@ -175,7 +175,7 @@ class ReadingFilter:
         self._own = known, slopes, kept, gain, total
 
     def innovations(self, values: Array | None = None) -> Array:
-        """Readings (T, c), or other values of the channels, less what went before tells, of unit variance."""
+        """Innovations of readings (T, c), or of other values of the channels, with unit variance."""
         return _innovations(self._residual if values is None else values, *self._own)
 
     def courses(
@@ -329,7 +329,7 @@ def _gains(known, variance, slopes, kept, slow):
 
 @njit(**OPTIONS)
 def _innovations(values, known, slopes, kept, gain, total):
-    """Values (T, c) less their mean given what went before, over its standard deviation."""
+    """Innovations of values (T, c): less their mean given the past, over its standard deviation."""
     steps, channels = values.shape
     own = slopes.shape[2]
     mean = np.zeros(channels + own)
@@ -361,7 +361,7 @@ def _follow(
     parent = np.zeros((steps, courses), dtype=np.int32)
     chosen = np.zeros((steps, courses), dtype=np.int8)
     most = 2 * courses
-    # Of every course: state, mean of the nuisances, weight, likelihood, what is on, its last two changes,
+    # For every course: state, mean of the nuisances, weight, likelihood, whether on, its last two changes,
     # its past.
     state, mean = np.zeros((most, n)), np.zeros((most, m))
     weight, likelihood = np.zeros(most), np.zeros(most)
@@ -471,7 +471,7 @@ def _follow(
             past[k] = spare[k]
             whole += joined[c]
         count = kept_courses
-        # What was on long ago is told by the courses that are left.
+        # States long ago are determined by the remaining courses.
         if t >= after - 1:
             old = (t + 1) % after
             share = 0.0

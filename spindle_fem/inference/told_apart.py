@@ -1,9 +1,9 @@
-"""How far apart effects lie in the readings of a test, once everything else has explained what it can.
+"""Distance between effects in the readings of a test, once everything else has explained what it can.
 
-An effect of some size leaves a course in every channel. Of it counts what the
-machine's own uncertain numbers and the noise cannot take up (generalised least
-squares), and against another effect what that one, of any size and with a law
-of any of its shapes, cannot take up either. To first order in the sizes.
+An effect of some size leaves a course in every channel. Only that part counts which the
+machine's own uncertain numbers and the noise cannot explain (generalised least
+squares) and, against another effect, which that effect, of any size and with a law
+of any of its shapes, cannot explain either. To first order in the sizes.
 
 Source of the information between two hypotheses: MacKay (2003), Information
 Theory, Inference, and Learning Algorithms, chapter 8 (mutual information).
@@ -25,7 +25,7 @@ from spindle_fem.inference import tuned
 
 Array = NDArray[np.float64]
 
-# Probability with which an effect of a stated size is seen, and told from another; and of a false alarm.
+# Probability with which an effect of a stated size is seen, and distinguished; and of a false alarm.
 POWER, FALSE_ALARM = 0.90, tuned.SIGNIFICANT
 # Sizes are stated that suffice for this share of the forms and shapes of an effect's law.
 SHARE_OF_FORMS = 0.75
@@ -52,10 +52,9 @@ def misfit_seen(freedom: int, trials: int) -> float:
 
 
 def misfit_told() -> float:
-    """Squared distance (χ²) from which one effect is told from another with ``POWER``.
+    """Squared distance (χ²) at which one effect is distinguished from another with ``POWER``.
 
-    The misfit of the other is then larger by what a diagnosis asks before it
-    no longer names both together.
+    The misfit of the other then exceeds the margin within which a diagnosis names both together.
     """
     width = norm.ppf(POWER)
     return float((width + np.sqrt(width**2 + tuned.NEAR_MISFIT)) ** 2)
@@ -77,7 +76,7 @@ def bits(squared: Array) -> Array:
 
 @cache
 def _bits_by_distance() -> tuple[Array, Array]:
-    """The same at distances up to one beyond which nothing is lost."""
+    """Bits at distances up to one beyond which nothing is lost."""
     distances = np.linspace(0.0, 15.0, 601)
     nodes, weights = np.polynomial.hermite_e.hermegauss(60)
     ratio = 0.5 * distances[:, None] ** 2 + distances[:, None] * nodes
@@ -87,7 +86,7 @@ def _bits_by_distance() -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class ChannelProducts:
-    """Inner products, channel by channel, of whitened answers to the machine's coordinates and to effects.
+    """Inner products, channel by channel, of whitened responses to the machine's coordinates and to effects.
 
     Attributes
     ----------
@@ -96,7 +95,7 @@ class ChannelProducts:
     own : (c, p, p) ndarray
     mixed : (c, p, m) ndarray
     effects : (c, m, m) ndarray
-        Of the answers to every form of every effect at its usual size.
+        Of the responses to every form of every effect at its usual size.
     """
 
     precision: Array
@@ -106,7 +105,7 @@ class ChannelProducts:
 
     @classmethod
     def of(cls, precision: Array, jacobians: Sequence[Array], answers: Sequence[Array]) -> ChannelProducts:
-        """From whitened columns (n, p) and (n, m) of each channel."""
+        """Build from whitened columns (n, p) and (n, m) of each channel."""
         return cls(
             precision,
             np.array([j.T @ j for j in jacobians]),
@@ -176,7 +175,7 @@ class EffectForms:
         return along**2 / stiff
 
     def _gain_of_two(self, gram: Array, stiff: Array, first: int, second: int) -> Array:
-        """What a mixture of two shapes of one law takes up; both of one sign."""
+        """Part absorbed by a mixture of two shapes of one law; both of one sign."""
         one, two, across = gram[:, first], gram[:, second], gram[first, second]
         determinant = stiff[first] * stiff[second] - across**2
         if determinant <= ROUNDING * stiff[first] * stiff[second]:
@@ -195,7 +194,7 @@ class EffectForms:
         return found
 
     def judged(self, gram: Array) -> Separation:
-        """What readings with these inner products tell."""
+        """Separation from readings with these inner products."""
         from_nothing, between = self.distances(gram)
         seen = np.array([misfit_seen(int(f), self.number) for f in self.freedom])
         with np.errstate(divide="ignore"):
@@ -211,7 +210,7 @@ class EffectForms:
             found.told_from[own] = _quantile(told_from[rows], share)
             mean = share @ information[rows] / share.sum()
             found.information_seen[own], found.information[own] = mean[0], mean[1:]
-        # What is not seen is not told from anything either.
+        # An effect that is not seen cannot be distinguished from anything either.
         np.maximum(found.told_from, found.seen_from[:, None], out=found.told_from)
         return found
 
@@ -226,14 +225,14 @@ def _quantile(values: Array, share: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Separation:
-    """What some readings would tell of k effects at places; sizes over the usual ones.
+    """Separability of k effects at places from some readings; sizes over the usual ones.
 
     Attributes
     ----------
     seen_from : (k,) ndarray
         Size from which each is seen; infinite where none is.
     told_from : (k, k) ndarray
-        Size of the one in the row from which it is told from that in the column.
+        Size of the effect in the row from which it is distinguishable from that in the column.
     information_seen : (k,) ndarray, [bit]
         Between each at its usual size and nothing.
     information : (k, k) ndarray, [bit]

@@ -33,27 +33,27 @@ SLOW_TIMES = (600.0, 1200.0, 2400.0, 4800.0)
 # Friction within a gap beyond what the inputs beside it say, one standard deviation as a share of the
 # highest: most machines go on as before.
 GAP_SIGMA = 0.3
-# What a machine with geometry may be beside its definition. A table of heat over speed: one standard
-# deviation as a share, and the part of the range of speed over which it stays alike. Share by which balls
+# Deviations of a machine with geometry from its definition. A table of heat over speed: one standard
+# deviation as a share, and the share of the speed range over which it is correlated. Share by which balls
 # conduct better at the highest speed. Clocks of inputs and temperatures, s: two loggers set by hand.
 HEAT_SHAPE_SIGMA, HEAT_SHAPE_LENGTH = 0.05, 0.3
 BALL_SPEED_SIGMA = 0.15
 CLOCK_SIGMA = 30.0
-# What bridges a housing from outside, W/K: a bracket of 60 x 40 mm steel, 0.2 m long, conducts 0.5.
+# External bridges to a housing, W/K: a bracket of 60 x 40 mm steel, 0.2 m long, conducts 0.5.
 BRIDGE_SIGMA = 0.5
 # Share by which the conductivity of a steel or an iron of one name varies with composition and temperature.
 CONDUCTIVITY_SIGMA = 0.05
-# Time by which a sensor in its hole, or in the stream, answers later than what it touches, s.
+# Delay of a sensor in its hole, or in the stream, behind its surroundings, s.
 RESPONSE_SIGMA = 10.0
 # Coolant that stood in hoses and channel before a recording, beside what flows then, K.
 STANDING_COOLANT_SIGMA = 3.0
 # Share by which laws of the catalogue miss what they explain: a slow error in proportion, while searching.
 LAW_INEXACT = 0.03
-# A network of a few nodes is a coarse picture: its slow error as multiples of the larger of the noise and
-# this share of what the temperatures move.
+# A network of a few nodes is a coarse model: its slow error as multiples of the larger of the noise and
+# this share of the range of the temperatures.
 NETWORK_SLOW_SIGMAS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 NETWORK_SHARE_OF_RISE = 0.01
-# What a roughly drawn network leaves open, one standard deviation each: share of a node's capacity that
+# Uncertainties of a coarsely defined network, one standard deviation each: share of a node's capacity that
 # follows with a lag; share by which conductances grow per kelvin (films of air, oil that thins); exponents.
 MASS_BESIDE, CONDUCTANCE_PER_K, EXPONENT_SIGMA = 0.12, 1.0e-3, 0.12
 # Share by which heat differs from its power of the input amid the input's range.
@@ -75,7 +75,7 @@ SAME_OPERATORS_WITHIN = 3.0e-3
 # ------------------------------------------------------------------------------------------------- fits
 # A fit ends with a step that lowers the misfit by less than the sum of a number and a share of it.
 SMALLEST_DECREASE, SMALLEST_DECREASE_SHARE = 0.02, 3.0e-4
-# A fit of a hypothesis stops early when it cannot reach the misfit asked for: after this many steps by this
+# A fit of a hypothesis stops early when it cannot reach the required misfit: after this many steps by this
 # many times the last decrease, or after the first by this many times what the linearised problem promises.
 HOPELESS_AFTER, HOPELESS_REACH = 3, 6.0
 # Slopes serve for a further step where they told the last one's change of the readings to this share of it.
@@ -126,7 +126,7 @@ IMPROVEMENT_ROUNDS = 2
 # Shares of the amplitudes that a fit begins from, until it can be simulated: friction that feeds on its own
 # heat has no steady state at amplitudes that the linearised problem overestimates.
 START_SHARES = (1.0, 0.5, 0.2)
-# An interval that lies in gaps of the recording by more than this share explains what nobody saw.
+# An interval that lies in gaps of the recording by more than this share explains what nobody recorded.
 MOST_IN_GAPS = 0.5
 
 # ------------------------------------------------------------------------------------------ final fits
@@ -143,7 +143,7 @@ NEAREST_REFITTED, NEAREST_WITHIN = 3, 1.3
 # 14 to 17, where the likelihood is flat from 1 to 3; by right sets on seeds 20, 22 and a third of 19: 164 of
 # 178 at 2, 162 at 3.)
 GAIN_DIVISOR, GAIN_DIVISOR_IN_A_SIZE = 2.0, 1.5
-# A network of a few nodes is a coarse picture: gains between sizes and over nothing count this many times
+# A network of a few nodes is a coarse model: gains between sizes and over nothing count this many times
 # less there. (On seed 5 of validation.generate_networks consistent networks gain up to 75, by two, and
 # effects that leave three times the noise from 50 on.)
 NETWORK_COARSENESS = 3.0
@@ -151,18 +151,19 @@ NETWORK_COARSENESS = 3.0
 # gains beyond the first number grow logarithmically, never slower than the straight gain over the second.
 INEXACT_BEYOND, LARGEST_INEXACT_DIVISOR = 4000.0, 4.0
 # Best gain on a consistent recording: its level by Wilks' theorem counts to the power one over the first
-# number, and this many candidates, which answer much alike, as one trial. (Likeliest over the 100 consistent
-# recordings of seeds 14 and 15; evenness by Kolmogorov and Smirnov 0.98 there, 0.5 on the 30 of seed 16.)
+# number, and this many candidates, whose responses are similar, as one trial. (Likeliest over the 100
+# consistent recordings of seeds 14 and 15; evenness by Kolmogorov and Smirnov 0.98 there, 0.5 on the 30
+# of seed 16.)
 CHANCE_DIVISOR, CANDIDATES_A_TRIAL = 2.2, 64.0
 # Amplitudes from this share of their usual size up to it are as likely in every decade. What is less than
 # this many of its own standard deviations counts as that large: a small fitted size is no evidence.
 SMALLEST_SIZE, SEEN_FROM = 0.01, 2.0
 # A set whose error on held-out readings is this many times that of some of its effects alone is given up.
 WORSE_HELDOUT = 1.05
-# What a set must make held-out readings likelier by to be named at all, as a gain that counts: twenty to one.
-# One that gains less there only moves parameters nearer to what was believed of them.
+# Gain in likelihood of held-out readings that a set needs to be named at all, as a gain that counts: twenty
+# to one. A set that gains less only moves parameters nearer to their priors.
 LEAST_HELDOUT_GAIN = 3.0
-# Of a network, share by which it must lower what is left of held-out readings over their noise. (Right sets
+# Share by which a set of a network must lower the residual of held-out readings over their noise. (Right sets
 # of seed 51 of generate_networks and of the examples lower it by more, false alarms by 1 % and less.)
 LEAST_IMPROVEMENT = 0.03
 # Probability from which the first set alone is named.
@@ -177,9 +178,9 @@ LISTED = 0.02
 SIGNIFICANT, RULED_OUT, STILL_POSSIBLE = 0.01, 0.001, 0.5
 # Root of the misfit per datum after the best set above which something else must be there.
 UNEXPLAINED_MISFIT = 1.6
-# What a set may leave of the readings, in units of their noise, and still be named as what is missing.
+# Largest residual over the noise with which a set may still be named as what is missing.
 MOST_LEFT = 2.0
-# What the fit to its own calibration may leave over the noise before a written network is called too coarse.
+# Residual over the noise, in the fit to its own calibration, above which a network is called too coarse.
 COARSE_LEFT = 2.0
 # Right sets leave a root misfit of 1 to a few hundredths. Beyond the first number the best set loses
 # probability to something outside the catalogue, over the second by as much again, the third at most.

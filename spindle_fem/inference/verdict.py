@@ -1,4 +1,4 @@
-"""What the fitted hypotheses amount to: probabilities, verdict, alternatives, p-value."""
+"""Conclusions from the fitted hypotheses: probabilities, verdict, alternatives, p-value."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Ranked:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What is concluded.
+    """Conclusion of a diagnosis.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
     """
     null = next(h for h in hypotheses if not h.fit.candidates)
     gains = [0.5 * (1.0 - h.course_share) * (null.misfit - h.misfit) for h in hypotheses]
-    # Within a size; the best of it stands for the size beside others.
+    # Within a size; the best set of a size is then compared with other sizes.
     scores = [
         float(
             h.log_prior
@@ -156,7 +156,7 @@ def any_magnitude(fit: Fit) -> float:
 
 
 def counted(gain: float) -> float:
-    """What a gain of likelihood counts for: all of it while small, a quarter of what comes on top later."""
+    """Gain of likelihood that counts: all of it while small, a quarter of the excess later."""
     ends = tuned.INEXACT_BEYOND * (tuned.LARGEST_INEXACT_DIVISOR - 1.0)
     inside = min(max(gain, 0.0), ends)
     beyond = max(gain - ends, 0.0) / tuned.LARGEST_INEXACT_DIVISOR
@@ -297,7 +297,7 @@ def judge(
         and item.best.misfit < chosen.best.misfit + tuned.NEAR_MISFIT
         and apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
     ]
-    # Which bearing of a set it is does not matter for the decision; the best stands for all.
+    # Which bearing of a set it is does not matter for the decision; the best represents all.
     alike = [item for item in ranked if _alike(item.fit, chosen.fit, known_as_one)]
     evidence = sum(item.probability for item in alike)
     share = share_of_last(hypotheses, chosen.best)
@@ -347,12 +347,11 @@ def _predicts(
     beyond: Callable[[Fit], float],
     coarseness: float,
 ) -> bool:
-    """Whether a set tells held-out readings better than chance does.
+    """Whether a set predicts held-out readings better than chance.
 
-    A coarse picture leaves more than noise, so that likelihoods make too much of it: of a network what is
-    left of readings counts, of those that were fitted too, and sensors' white noise hides less of it. Where
-    nothing missing leaves no more than the noise, by directions far from what is believed of them, less does
-    not count.
+    A coarse model leaves more than noise, so that likelihoods exaggerate: for a network the residual
+    counts, that of fitted readings too, and sensors' white noise hides less of it. If the fit without effects
+    leaves only noise, with directions far from their priors, a smaller residual does not count.
     """
     if chosen.heldout is None or empty.heldout is None:
         return True
@@ -373,9 +372,9 @@ def unexplained_share(rest: float) -> float:
 
 
 def may_stand_for(fit: Fit, other: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
-    """Whether a set is another explanation of as many effects as one has.
+    """Whether a set is an alternative explanation with as many effects as another.
 
-    What is on in intervals fits much: it stands for such effects only.
+    Effects on in intervals fit much: they can only replace such effects.
     """
     return (
         len(fit.candidates) == len(other.candidates)

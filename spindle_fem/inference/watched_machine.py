@@ -40,13 +40,13 @@ PIECE_INSTANTS = 60
 _OWN_HERE = (START_PREFIX, MISDESCRIBED_IN_PREFIX)
 # Innovations by which the spread is judged, at most.
 MOST_NUMBERS = 20_000
-# Instants by which heating and cooling are told apart.
+# Instants by which heating and cooling are distinguished.
 REMEMBERED = 300
 
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What holds at one instant.
+    """State of the machine at one instant.
 
     Attributes
     ----------
@@ -199,7 +199,7 @@ class WatchedMachine:
         instants = _Instants.of(piece, observations, told, sigma, self.width)
         self._channels = piece.temperature_names
         if np.diff(piece.times).max() > self._gap:
-            # What a machine with geometry did meanwhile nobody saw: its state is unknown until it has faded.
+            # The history of a machine with geometry during the gap is unknown until it has faded.
             self._unknown_until = float(piece.times[-1]) + FADED * self.run.slowest_time()
         if not instants.times.size:
             return []

@@ -15,7 +15,7 @@ from spindle_fem.parallel import Shared, WorkerPool
 
 @dataclass(frozen=True, slots=True)
 class FitOrder:
-    """One fit that is wanted.
+    """One fit to compute.
 
     Attributes
     ----------
@@ -71,16 +71,16 @@ class Workers:
         self._pool.wake()
 
     def fits(self, problem: Problem, orders: Sequence[FitOrder]) -> list[Fit | None]:
-        """Fits in the order asked for, with the candidates that were given."""
+        """Fits in the order given, with the candidates that were given."""
         fits = self.done(problem, [partial(fit_order, order=order) for order in orders])
-        # Candidates are known by identity; those that come back are copies.
+        # Candidates are identified by object; those that come back are copies.
         return [
             None if fit is None else replace(fit, candidates=order.candidates)
             for fit, order in zip(fits, orders, strict=True)
         ]
 
     def done(self, problem: Problem, jobs: Sequence[Callable[[Problem], Any]]) -> list[Any]:
-        """What each job makes of the problem, in their order.
+        """Result of each job on the problem, in order.
 
         Parameters
         ----------

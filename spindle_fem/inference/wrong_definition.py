@@ -81,7 +81,7 @@ def wrong_direction(
 
 
 def without_prior(belief: Belief, row: int) -> Belief:
-    """The same with another ``WIDER`` standard deviations of one coordinate, and bounds as much wider."""
+    """The belief with another ``WIDER`` standard deviations of one coordinate, and bounds as much wider."""
     unit = np.zeros(len(belief.mean))
     unit[row] = WIDER
     covariance = np.linalg.inv(belief.root.T @ belief.root) + np.outer(unit, unit)
@@ -94,7 +94,7 @@ def without_prior(belief: Belief, row: int) -> Belief:
 
 
 def with_wrong_definition(judgement: Judgement, null: Fit, wrong: WrongDirection | None) -> Judgement:
-    """A judgement that nothing is missing, told as a wrong definition where its direction says so."""
+    """A judgement that nothing is missing, changed to a wrong definition if its direction explains more."""
     if wrong is None or judgement.verdict != "consistent":
         return judgement
     item = wrong.direction
