@@ -428,6 +428,24 @@ def test_preload_follows_the_temperatures():
 
 # --------------------------------------------------------------------- cases
 @pytest.mark.slow
+def test_a_study_couples_far_within_the_error_of_its_steps(quick):
+    """Readings are those of a coupling to round-off, to a fiftieth of what a step may err by."""
+    content = {
+        "schema": "spindle-fem/transient/1",
+        "name": "short",
+        "phase": [{"name": "3000", "speed": "3000 rpm", "duration": "30 min"}],
+    }
+    study = study_of(content)
+    run = run_study(quick, study).phases[0].transient
+    kept = study_of({**content, "fields_every": "1 h"})
+    exact = run_study(quick, kept).phases[0].transient
+    assert exact.energy.imbalance_relative < 1e-8
+    assert run.counts["evaluations"] < 0.7 * exact.counts["evaluations"]
+    assert run.energy.imbalance_relative < study.options().energy_tolerance == pytest.approx(1e-5)
+    assert np.abs(run.readings - exact.readings).max() < 0.02 * study.error
+
+
+@pytest.mark.slow
 def test_step_test_goes_on_when_settled(quick):
     """Each speed ends at the first look at which no probe has moved by the threshold."""
     study = study_of(
@@ -450,7 +468,7 @@ def test_step_test_goes_on_when_settled(quick):
         at = [readings[np.flatnonzero(times == phase.end - back)[0]] for back in (0.0, 600.0)]
         if phase is second:
             assert np.abs(at[0] - at[1]).max() < 2.0
-        assert phase.transient.energy.imbalance_relative < 1e-8
+        assert phase.transient.energy.imbalance_relative < study.options().energy_tolerance
     earlier = [readings[np.flatnonzero(times == second.end - back)[0]] for back in (300.0, 900.0)]
     assert second.end - second.start == 600.0 or np.abs(earlier[0] - earlier[1]).max() >= 2.0
 
@@ -470,4 +488,4 @@ def test_cool_down_after_switch_off(paper_machine, steady):
     assert np.all(run.steps.bearing_heat == 0.0)
     assert np.all(np.diff(run.steps.hottest) < 0.0)
     assert run.energy.stored < 0.0
-    assert run.energy.imbalance_relative < 1e-8
+    assert run.energy.imbalance_relative < 1e-5
