@@ -161,7 +161,7 @@ def diagnose_recordings(
     problem = with_inexact_laws(problem, problem.fit())
     clock.lap("reduction")
     search = Search(problem, view, effects, candidates, interval_effects(), weights, progress, workers)
-    found = run_search(search)
+    found = [replace(h, expected_misfit=h.fit.reduced_misfit) for h in run_search(search)]
     clock.lap("search")
     progress("diagnosis: final fits")
     coarseness = tuned.NETWORK_COARSENESS if machine.is_network else 1.0

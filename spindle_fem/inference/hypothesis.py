@@ -27,6 +27,8 @@ class Hypothesis:
         That cost where the set was found, as a logarithm.
     heldout : float or None
         Minus twice the logarithm of the likelihood of held-out readings; None where there are none.
+    expected_misfit : float
+        Misfit for each datum under the errors that were expected before these readings.
     """
 
     fit: Fit
@@ -35,6 +37,7 @@ class Hypothesis:
     course_share: float = 0.0
     course_cost: float = 0.0
     heldout: float | None = None
+    expected_misfit: float = 1.0
 
     @property
     def misfit(self) -> float:

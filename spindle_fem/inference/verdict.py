@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -268,6 +268,11 @@ def judge(
         ranked = _without(ranked, empty)
     chosen = ranked[0]
     improved = _predicts(chosen.best, empty.best, left, beyond, coarseness)
+    if chosen.fit.candidates and not improved:
+        # What does not tell held-out readings is given up: nothing missing has its probability.
+        kept = [i for i in ranked if i.fit.candidates]
+        kept = [i for i in kept if _predicts(i.best, empty.best, left, beyond, coarseness)]
+        empty = replace(empty, probability=1.0 - sum(i.probability for i in kept))
     if (
         p_value > tuned.SIGNIFICANT
         or not (chosen.fit.candidates and improved)
@@ -282,7 +287,7 @@ def judge(
         # The residual is there, and no set of the catalogue makes it likelier.
         left_over = float(chi2.sf(empty.fit.misfit, len(empty.fit.residual)))
         reason = "the readings differ from the model by more than the noise, and no effect explains it"
-        return Judgement("unexplained", left_over, empty, (), 1.0, reason)
+        return Judgement("unexplained", left_over, replace(empty, probability=0.0), (), 1.0, reason)
     misfit = float(np.sqrt(chosen.fit.reduced_misfit))
     inexact = float(np.clip((misfit - tuned.EXACT_MISFIT) / tuned.OTHER_RANGE, 0.0, tuned.LARGEST_OTHER))
     rest = left(chosen.fit)
@@ -392,8 +397,9 @@ def _with_needed_events(
 ) -> list[Hypothesis]:
     """Sets without those of whose laws some, or none, leave no more of the readings than may be left of them.
 
-    What may come and go at any time fits some of whatever a coarse picture leaves, and follows held-out
-    readings themselves: that they become likelier with it says little.
+    Neither in units of the noise nor of the errors that were expected before these readings. What may come
+    and go at any time fits some of whatever a coarse picture leaves, and follows held-out readings itself:
+    that they become likelier with it says little.
     """
 
     def only_laws(item: Hypothesis) -> frozenset:
@@ -403,8 +409,12 @@ def _with_needed_events(
     plain = [item for item in hypotheses if not _free_in_time(item.fit)]
 
     def needed(item: Hypothesis) -> bool:
-        laws = [other.fit for other in plain if other.keys <= only_laws(item)]
-        return all(max(left(fit), beyond(fit)) > tuned.MOST_LEFT for fit in laws)
+        return all(
+            np.sqrt(other.expected_misfit) > tuned.UNEXPLAINED_MISFIT
+            or max(left(other.fit), beyond(other.fit)) > tuned.MOST_LEFT
+            for other in plain
+            if other.keys <= only_laws(item)
+        )
 
     return [item for item in hypotheses if not _free_in_time(item.fit) or needed(item)]
 

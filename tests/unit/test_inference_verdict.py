@@ -266,8 +266,8 @@ def test_events_of_a_network_are_named_where_laws_without_them_leave_too_much():
     assert found(little, much, null, alone) == null.keys
     assert found(much, little, null, law, both) == law.keys
     assert found(much, much, null, law, both) == both.keys
-    # A machine that is drawn has likelihoods that may be trusted.
     assert found(little, much, null, alone, coarseness=1.0) == alone.keys
+    assert found(little, much, replace(null, expected_misfit=3.0), alone) == alone.keys
 
 
 def test_what_nothing_could_do_by_chance_has_no_probability_left():
