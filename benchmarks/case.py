@@ -222,7 +222,7 @@ def write_case(folder: Path, machine: PreparedMachine, loads: dict[str, SurfaceL
 
 
 def read_case(folder: Path) -> tuple[TaggedMesh, dict]:
-    """The mesh with parts apart, and what ``case.json`` says."""
+    """The mesh with separate parts, and the content of ``case.json``."""
     case = json.loads((folder / "case.json").read_text(encoding="utf-8"))
     with np.load(folder / "mesh.npz") as data:
         surfaces = {name[8:]: data[name] for name in data.files if name.startswith("surface:")}

@@ -1,4 +1,4 @@
-"""What moving meshes saves in a sweep of channel geometries, and what it does to the temperatures.
+"""Time saved by moving meshes in a sweep of channel geometries, and the change of the temperatures.
 
     python benchmarks/morphing.py [--machine recorded_spindle] [--preset normal] [--random 0]
 
@@ -54,7 +54,7 @@ def solved_on(spec: MachineSpec, mesh: TaggedMesh) -> tuple[ThermalResult, float
 
 
 def compare(spec: MachineSpec, meshes: dict[str, TaggedMesh]) -> tuple[float, float, float] | None:
-    """One line of the table; seconds of a new mesh, of moving one, and of the rest of a design."""
+    """One line of the table; seconds for a new mesh, for moving one, and for the rest of a design."""
     target = build_assembly(spec)
     values = ", ".join(f"{name} {getattr(spec.channel, name) * 1e3:5.2f}" for name in MOVABLE)
     begin = time.process_time()

@@ -68,7 +68,7 @@ def numbered(mesh: TaggedMesh) -> tuple[TaggedMesh, NDArray[np.int32]]:
 
 
 def _graph(tetrahedra: NDArray[np.int64], n: int) -> sparse.csr_matrix:
-    """Which nodes share an element, themselves included."""
+    """Graph of nodes that share an element, including themselves."""
     pairs = [(tetrahedra[:, i], tetrahedra[:, j]) for i in range(4) for j in range(4)]
     rows, columns = (np.concatenate(side) for side in zip(*pairs, strict=True))
     return sparse.csr_matrix((np.ones(len(rows), dtype=np.int32), (rows, columns)), shape=(n, n))

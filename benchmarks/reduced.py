@@ -102,7 +102,7 @@ def step_test(machine: PreparedMachine, *, whole: bool) -> StudyResult:
 
 
 def fast_step_test(fast: FastModel, result: StudyResult) -> tuple[np.ndarray, np.ndarray]:
-    """The same by the fast model in steps of 10 s, (n, c) K, and which samples belong to the cool-down."""
+    """Step test by the fast model in steps of 10 s, (n, c) K, and which samples belong to the cool-down."""
     samples = result.joined("times")
     times = np.union1d(np.arange(0.0, samples[-1], 10.0), samples)
     owner = np.searchsorted([phase.start for phase in result.phases], times, side="right") - 1

@@ -1,4 +1,4 @@
-"""What the memory allows: stream bandwidth, one sparse product, the products that a solve takes.
+"""Limits set by the memory: stream bandwidth, one sparse product, the products that a solve takes.
 
 python benchmarks/roofline.py CASE_FOLDER
 """

@@ -6,7 +6,7 @@ Every design differs in flow and oil temperature, so all share one mesh. For
 each number of workers: rows a second of the study, and the overhead a row:
 the same tasks through the same scheduler with an answer that is ready. Then,
 from what reading, checking, sending and writing one design costs, the paper
-estimate for a million. More workers than cores tell of contention, not of
+estimate for a million. More workers than cores show contention, not
 scaling.
 """
 
@@ -93,7 +93,7 @@ def on_cluster(prepared: PreparedStudy, workers: int) -> dict[str, float]:
 
 
 def costs_of_one(machine: str, study: Path, overrides: list[str], prepared: PreparedStudy) -> dict:
-    """What the client pays for one design: reading and checking, sending, writing its row."""
+    """Cost of one design for the client: reading and checking, sending, writing its row."""
     begin = time.process_time()
     again = prepare_study(machine, study, overrides)
     reading = (time.process_time() - begin) / len(again.tasks)

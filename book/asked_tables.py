@@ -1,4 +1,4 @@
-"""Tables of what is asked of a diagnosis, for one study and for earlier ones beside it."""
+"""Tables of the requirements on a diagnosis, for one study and for earlier ones beside it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _bound(row: Mapping[str, Any]) -> str:
 
 
 def asked_table(asked: Sequence[Mapping[str, Any]]) -> Table:
-    """Every figure that is asked for, with what came out."""
+    """Every required figure, with its result."""
     rows = [
         [
             row["words"],
@@ -60,7 +60,7 @@ def asked_table(asked: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def earlier_table(desk: Desk, asked: Sequence[Mapping[str, Any]]) -> list[Table]:
-    """The same figures of studies with other seeds, which the tool was looked at with before."""
+    """The figures for studies with other seeds, which were looked at during development."""
     studies = [(study_seed(study), score_study(study, study / "results")[0]) for study in desk.earlier]
     if not studies:
         return []

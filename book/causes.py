@@ -17,7 +17,7 @@ CAUSES = Path(__file__).parent / "causes.toml"
 
 
 def wrong_table(wrong: Sequence[Mapping[str, Any]], causes: Mapping[str, Mapping[str, str]]) -> Table:
-    """Every wrong case: what was concealed, what was said instead, and why."""
+    """Every wrong case: what was concealed, what was reported instead, and why."""
     rows = []
     for row in wrong:
         cause = causes.get(row["case"], {})
@@ -57,7 +57,7 @@ def _spaced(text: str) -> str:
 
 
 def cause_counts(wrong: Sequence[Mapping[str, Any]], causes: Mapping[str, Mapping[str, str]]) -> list[Any]:
-    """How many cases each kind of cause has."""
+    """Number of cases of each kind of cause."""
     kinds = Counter(causes.get(row["case"], {}).get("kind", OPEN) for row in wrong)
     listed = [[kind, str(count)] for kind, count in kinds.most_common()]
     return [Table((column("kind of cause"), column("cases", number=True)), rows_of(listed))] if listed else []

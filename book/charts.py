@@ -20,7 +20,7 @@ _COUNTS = LinearSegmentedColormap.from_list("counts", ["#eef4f9", "#0b5c94"])
 def matrix(
     counts: Mapping[str, Mapping[str, int]], title: str, notes: str, rows: str, columns: str
 ) -> Figure:
-    """Counts in a table of squares, true down, said across; zero is left white."""
+    """Counts in a table of squares, truth by row, finding by column; zero is left white."""
     across = list(dict.fromkeys(name for row in counts.values() for name in row))
     down = list(counts)
     values = np.array([[counts[a].get(b, 0) for b in across] for a in down], dtype=float)

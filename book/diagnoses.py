@@ -23,29 +23,29 @@ from spindle_fem.results.output_folder import is_complete
 
 
 def finished(folder: Path) -> bool:
-    """Whether a diagnosis stands in a folder."""
+    """Whether a folder has a diagnosis."""
     return (folder / "diagnosis.json").is_file() and is_complete(folder)
 
 
 def verdict_blocks(content: Mapping[str, Any]) -> list[Any]:
-    """What the tool says, in its own words, and its numbers."""
+    """Verdict of the tool in its own words, and its numbers."""
     return [Notice(verdict_sentence(content)), cards(content), fit_table(content), *channel_table(content)]
 
 
 def found_blocks(content: Mapping[str, Any]) -> list[Any]:
-    """What was found, against what, and how sure that is, in the tool's own words."""
+    """Findings, alternatives and certainty, in the tool's own words."""
     return [*set_tables(content), Text("How sure this is, by the tool:"), Bullets(confidence_words(content))]
 
 
 def place_blocks(content: Mapping[str, Any]) -> list[Any]:
-    """Where and when, where something was found."""
+    """Place and time of the mismatch, if anything was found."""
     if content["verdict"] == "consistent":
         return []
     return [*where_text(content), *place_tables(content)]
 
 
 def next_step_blocks(content: Mapping[str, Any]) -> list[Any]:
-    """What to measure next."""
+    """Proposed next measurement."""
     return list(next_blocks(content))
 
 

@@ -1,4 +1,4 @@
-"""What a concealed study is made of, counted in its answers."""
+"""Composition of a concealed study, counted in its answers."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from spindle_fem.errors import SpindleFemError
 _NUMBER = r"[-+]?(?:\d+\.\d*|\.\d+|\d+)(?:[eE][-+]?\d+)?"
 _BAND = re.compile(rf"({_NUMBER}) ± ({_NUMBER})")
 _LIMIT = re.compile(r"^([^<>=]+?)\s*(<=|>=|<|>)\s*([^<>=]+)$")
-# What pytest adds beneath a comparison: where values come from, and a table of unequal ones.
+# Lines that pytest adds beneath a comparison: origin of values, and a table of unequal ones.
 _APPENDED = re.compile(r"\n\s*(?:\+|comparison failed)")
 _WRAPPED = re.compile(rf"(?:np\.)?(?:float64|float32|int64)\(({_NUMBER})\)")
 
@@ -41,7 +41,7 @@ class TestsFailedError(SpindleFemError):
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One comparison of a test; ``used`` is the deviation over what is allowed, for equalities."""
+    """One comparison of a test; ``used`` is the deviation over the tolerance, for equalities."""
 
     source: str
     relation: str
@@ -55,7 +55,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Test:
-    """One test: what it says, what it compared, and the errors of its refinements."""
+    """One test: its statement, its comparisons, and the errors of its refinements."""
 
     identifier: str
     name: str
@@ -71,7 +71,7 @@ class Test:
 
     @property
     def title(self) -> str:
-        """What it says, or its name in words."""
+        """Statement of the test, or its name in words."""
         name, _, case = self.name.partition("[")
         words = self.says.split("\n")[0].rstrip(".") or name.removeprefix("test_").replace("_", " ")
         return f"{words} [{case.rstrip(']')}]" if case else words
@@ -166,7 +166,7 @@ def comparison_of(source: str, text: str) -> Check:
             left, right = right, left
         bands = [(float(a), float(b)) for a, b in _BAND.findall(right)]
         found = [float(value) for value in re.findall(_NUMBER, left)]
-        # What pytest or numpy cut short has no numbers to rely on.
+        # Output that pytest or numpy cut short has no numbers to rely on.
         if bands and len(bands) == len(found) and "..." not in text:
             shares = [
                 _share(value, reference, allowed)
@@ -212,7 +212,7 @@ def _share(value: float, reference: float, allowed: float) -> float:
 
 
 def worst_by_assertion(checks: Sequence[Check]) -> list[tuple[Check, int]]:
-    """Of an assertion that ran several times the tightest one, with the number of values compared."""
+    """The tightest check of each assertion that ran several times, with the number of values compared."""
     kept: dict[tuple[str, str], tuple[Check, int]] = {}
     for check in checks:
         key = (check.source, check.relation)

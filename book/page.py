@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Chapter:
-    """What a chapter found.
+    """Results of a chapter.
 
     Attributes
     ----------
     outcome : str
         One sentence with the figures, for the page of contents.
     tone : {"good", "bad", ""}
-        ``good`` where every figure asked for is met, ``bad`` where one is not.
+        ``good`` if every required figure is met, ``bad`` if one is not.
     evidence, not_evidence : sequences of str
         What the chapter shows, and what it does not.
     left_out : str

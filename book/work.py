@@ -1,4 +1,4 @@
-"""Where chapters keep the data they made, so that a book that was interrupted goes on where it stopped."""
+"""Store the data of chapters, so that an interrupted book resumes where it stopped."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from spindle_fem.results.output_folder import replace_text
 
 ROOT = Path(__file__).parents[1]
 STAMP = "step.json"
-# What data are made with: they are made anew when any of it changes.
+# Sources of the data: they are made anew when any of these changes.
 _SOURCES = {
     "tool": (("spindle_fem", "**/*.py"), ("geometry", "*.toml")),
     "generator": (("validation", "*.py"),),
@@ -50,20 +50,20 @@ class Step:
 
 @dataclass(slots=True)
 class Desk:
-    """What a chapter works with.
+    """Paths and settings of a chapter's work.
 
     Attributes
     ----------
     work : Path
         Folder of the data that chapters make.
     study, results : Path
-        Concealed study: ``inputs`` and ``answers``, and what ``validation.run_study`` left.
+        Concealed study: ``inputs`` and ``answers``, and the output of ``validation.run_study``.
     recordings : Path
         Folder of the real recordings; chapters that need it are left out by name without it.
     keep : bool
         Use data made with an earlier version of the source, and say so.
     tell : callable
-        Told each step as it begins.
+        Called with each step as it begins.
     earlier : tuple of Path
         Folders of earlier concealed studies, each with its ``results``.
     """

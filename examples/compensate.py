@@ -20,7 +20,7 @@ COLD = 22.0  # °C: where the axes were set
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "runs/compensate_example")
 export_machine(Path(__file__).with_name("pump.toml"), folder / "pump_model.py")
 
-# What the control runs: the exported file and numpy, nothing of this package.
+# The control needs only the exported file and numpy, nothing of this package.
 model = runpy.run_path(str(folder / "pump_model.py"))["model"]()
 casing = model.outputs.index("casing")
 model.start(COLD)

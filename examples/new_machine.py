@@ -51,7 +51,7 @@ machine = {
     "mesh": {"preset": "coarse", "order": 1},
 }  # fmt: skip
 
-try:  # two faults at once: both are told, each with its place and what is allowed
+try:  # two faults at once: both are reported, each with its place and what is allowed
     validate({**machine, "mesh": {"preset": "corse"}, "initial": "cold"})
 except FaultsError as faults:
     print(faults)

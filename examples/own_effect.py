@@ -39,7 +39,7 @@ class ColdFloor(Effect):
         return tuple(self.candidate(key, t, amplitude="conductance", reference=2.0) for key, t in terms)
 
     def statement(self, candidate, reported):
-        """How well the floor conducts."""
+        """State the conductance to the floor."""
         return f"{candidate.component} loses {reported['conductance'].value:.2f} W/K to the floor."
 
 

@@ -1,4 +1,4 @@
-"""Solve a spindle and look at the answer: temperatures, heat of the bearings, where the heat goes."""
+"""Solve a spindle and look at the result: temperatures, heat of the bearings, where the heat goes."""
 
 import spindle_fem
 
@@ -14,7 +14,7 @@ for name, bearing in result.bearings.items():
     difference = bearing.temperature_inner - bearing.temperature_outer
     print(f"{name:14s} {bearing.heat:6.1f} W, inner ring {difference:+.1f} K against outer ring")
 
-# What leaves through each film, and whether it adds up to what the bearings make.
+# Heat through each film, and whether the sum equals the heat of the bearings.
 for name, watts in sorted(result.energy.heat_out.items(), key=lambda item: -item[1]):
     print(f"{name:40s} {watts:7.2f} W")
 print(f"heat in {result.energy.heat_in:.1f} W, imbalance {result.energy.imbalance_relative:.1e}")

@@ -33,7 +33,7 @@ from spindle_fem.validity import range_text
 
 
 def _estimate(rule: str) -> str:
-    """What a rule of the catalogue says beside the standard."""
+    """Estimate in a rule of the catalogue, beside the standard."""
     return rule.partition("; ")[2]
 
 

@@ -1,4 +1,4 @@
-"""Channels that a design study may ask for, drawn at random."""
+"""Draw channels at random that a design study may request."""
 
 from __future__ import annotations
 

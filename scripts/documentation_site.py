@@ -84,7 +84,7 @@ def write_texts(folder: Path) -> list[tuple[str, str]]:
 
 
 def write_gallery(folder: Path) -> list[tuple[str, str]]:
-    """Notebooks and scripts with what they answer; address and title of each."""
+    """Notebooks and scripts with their results; address and title of each."""
     folder.mkdir()
     work = folder / "work"
     shutil.copytree(EXAMPLES, work)

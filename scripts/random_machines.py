@@ -287,10 +287,10 @@ def _helix(
 
 
 def solve_machine(content: dict[str, Any], file: Path, *, meshed: bool = True) -> tuple[str, str]:
-    """What becomes of a machine: ``solved``, ``refused``, ``unsettled`` or ``failed``, and why or how warm.
+    """Outcome of a machine: ``solved``, ``refused``, ``unsettled`` or ``failed``, and why or how warm.
 
-    Refused is what its definition, its geometry or its bearings rule out, by name; unsettled what elements or
-    network say has no steady state; anything else is a failure.
+    Refused: ruled out by definition, geometry or bearings, by name; unsettled: no steady state by elements or
+    network; anything else is a failure.
     """
     file.write_text(tomli_w.dumps(content), encoding="utf-8")
     try:

@@ -1,10 +1,10 @@
-"""What is asked of a diagnosis, held against what a study found."""
+"""Requirements on a diagnosis, compared with the results of a study."""
 
 from typing import Any
 
 import numpy as np
 
-# What is asked of a diagnosis: key of the summary, words, relation, bound; a share unless said otherwise.
+# Requirements on a diagnosis: key of the summary, words, relation, bound; a share unless said otherwise.
 ASKED = (
     ("false_alarms", "consistent recordings flagged as mismatch", "<=", 0.02),
     ("clear_single_first", "clear single effects named first", ">=", 0.95),
@@ -21,7 +21,7 @@ ASKED = (
 
 
 def held_against_asked(summary: dict[str, Any]) -> list[dict[str, Any]]:
-    """Every figure that is asked for: what it is, on how many cases, and whether it is met.
+    """Every required figure: its value, the number of cases, and whether it is met.
 
     >>> one = held_against_asked({"false_alarms": {"share": 0.01, "of": 100}})[0]
     >>> one["value"], one["met"]

@@ -17,12 +17,12 @@ def study_seed(study: Path) -> int | None:
 
 
 def read_causes(path: Path, seed: int | None, generator: str = SPINDLE) -> dict[str, dict[str, str]]:
-    """Causes by case, for one seed of one generator (that of the recorded spindle where none is named).
+    """Causes by case, for one seed of one generator (that of the recorded spindle by default).
 
     Raises
     ------
     BadInputError
-        A case stands there twice, or without a cause.
+        A case is listed twice, or without a cause.
     """
     found: dict[str, dict[str, str]] = {}
     for entry in tomllib.loads(path.read_text(encoding="utf-8")).get("case", []):

@@ -35,7 +35,7 @@ def coefficients_at(speed: float, groups: dict[str, object]) -> dict[str, float]
 def steady_full(
     fv: FiniteVolumes, speed: float = 3000.0, inlet: float = 15.0, ambient: float = 17.6, rate: float = 0.0
 ) -> tuple[np.ndarray, float]:
-    """Readings of the unreduced model, and heat out over heat in; ``rate`` > 0 answers at 1/s instead."""
+    """Readings of the unreduced model, and heat out over heat in; the response at a ``rate`` > 0, 1/s."""
     coefficients = coefficients_at(speed, fv.pair_groups | fv.film_groups)
     film, capacity, _ = (float(x) for x in channel_film(inlet))
     operator, used = full_operator(fv, coefficients, film)
@@ -59,7 +59,7 @@ def steady_full(
 
 
 def steady_reduced(model, speed: float = 3000.0, inlet: float = 15.0, ambient: float = 17.6) -> np.ndarray:
-    """The same readings by the reduced model."""
+    """Readings of the reduced model."""
     film, capacity, _ = (float(x) for x in channel_film(inlet))
     nominal = coefficients_at(speed, dict.fromkeys(model.groups))
     used = conductance(np.array([nominal[name] for name in model.groups]), model.series)

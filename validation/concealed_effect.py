@@ -26,7 +26,7 @@ KINDS = {
 
 @dataclass(slots=True)
 class Concealed:
-    """One effect as it is in the machine, with the part of the answer that belongs to it."""
+    """One effect in the machine, with its part of the answer."""
 
     effect: str
     component: str
@@ -48,7 +48,7 @@ class Concealed:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What a draw may look at: the run of the same machine without any effect."""
+    """Basis of a draw: the run of the same machine without any effect."""
 
     rng: np.random.Generator
     model: ReducedSpindle

@@ -16,7 +16,7 @@ CYCLES = ("hold", "staircase", "intermittent", "random", "two_level")
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What was chosen for one recording."""
+    """Choices for one recording."""
 
     cycle: str
     oil: str

@@ -1,4 +1,4 @@
-"""Draw concealed effects of the machine: what, where, how strong, and what an answer about it must say."""
+"""Draw concealed effects of the machine: kind, place, strength, and the answers that count as right."""
 
 from collections.abc import Callable
 

@@ -220,7 +220,7 @@ def _film_faces(boundary) -> dict[str, tuple]:
 
 
 def _places(b: _Builder) -> dict[str, NDArray[np.float64]]:
-    """Where a watt can enter: raceways, and the places of heat that no input tells of."""
+    """Places where heat can enter: raceways, and places of unrecorded heat."""
     places: dict[str, NDArray[np.float64]] = {}
 
     def put(name: str, vector: NDArray[np.float64]) -> None:

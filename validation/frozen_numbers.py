@@ -24,7 +24,7 @@ RECORDINGS = ROOT.parent / "shared" / "recordings"
 COARSE = ("--set", "mesh.preset=coarse")
 # The full model is compared to its linear solver's tolerance, fast models to their fits' stopping limits.
 FULL, FAST = 1e-9, 1e-6
-# Columns and keys that tell of the source, the machine and the moment, not of the result.
+# Columns and keys that identify the source, the machine and the moment, not the result.
 HASHES = ("key", "geometry")
 PASSING = (
     "versions",
@@ -43,7 +43,7 @@ PASSING = (
 
 @dataclass(frozen=True)
 class Case:
-    """One command whose numbers stay.
+    """One command whose numbers are frozen.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ CASES = {
 
 
 def numbers(content: object, where: str = "") -> dict[str, float | str]:
-    """Every number and word of a result by its path, without what tells of machine and moment."""
+    """Every number and word of a result by its path, without those that depend on machine and moment."""
     if isinstance(content, dict):
         found: dict[str, float | str] = {}
         for key, value in content.items():

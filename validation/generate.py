@@ -23,13 +23,13 @@ UNSEEN_RATIO, UNSEEN_CHI2 = 0.3, 20.0
 CLEAR_RATIO, CLEAR_CHI2 = 1.0, 120.0
 # No effect moves a reading by more, K; what does is an explicit law that its steps cannot follow.
 LARGEST_CHANGE = 300.0
-# A mimic that leaves less than this cannot be told from the truth.
+# A mimic that leaves a residual below this is indistinguishable from the truth.
 TWIN_RATIO, TWIN_CHI2 = 0.4, 14.0
 HEAVY = ("thermal_preload", "gap_closure", "grease_churning", "unrecorded_heat_source", "starvation")
 
 
 def choose_effects(number: int, rng: np.random.Generator) -> list[str]:
-    """Which effects the case conceals: a quarter none, half one, a quarter two.
+    """Effects that the case conceals: a quarter none, half one, a quarter two.
 
     Single effects go through the whole catalogue in turn so that none is left to chance.
     """
@@ -202,7 +202,7 @@ def _verdict_of(effects: list[Concealed]) -> str:
 
 
 def effects_set(effects: list[Concealed]) -> list[dict[str, object]]:
-    """A set as the answers list it."""
+    """A set in the form of the answers."""
     return [{"effect": e.effect, "components": e.acceptable} for e in effects]
 
 
@@ -250,7 +250,7 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
         verdicts.append("ambiguous")
     own, best = known["own_simple_form"], known["best_mimics"]
     if all(not _unseen(part["ratio"], part["chi2"]) for part in known["each"]):
-        # As near as the truth's own plain law comes; unrecorded heat is the way out where no other law fits.
+        # As near as the truth's own plain law comes; unrecorded heat is the fallback where no other law fits.
         plain = float(own["chi2"]) if own and len(effects) == 1 else 0.0
         out["indistinguishable"] = [
             t for t in twins if t["chi2"] < plain + TWIN_CHI2 and not t["effect"].startswith("unrecorded_")
@@ -271,7 +271,7 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
 
 
 def effect_answer(effect: Concealed) -> dict[str, object]:
-    """What an answer says of one effect."""
+    """Answer about one effect."""
     return {
         "effect": effect.effect,
         "kind": effect.kind,
@@ -289,7 +289,7 @@ def effect_answer(effect: Concealed) -> dict[str, object]:
 def make_case(
     model: ReducedSpindle, folder: FilePath, seed: int, number: int, *, identify: bool = True
 ) -> dict[str, object]:
-    """Draw, simulate, write one case; returns its answer."""
+    """Draw, simulate and write one case; return its answer."""
     rng = np.random.default_rng([seed, number])
     name = f"case_{number:04d}"
     as_built = draw_as_built(rng)
@@ -333,7 +333,7 @@ def make_case(
 
 
 def plan_for(wanted: list[str], rng: np.random.Generator) -> Plan:
-    """A cycle that excites what is asked for, most of the time."""
+    """A cycle that excites the wanted effects, most of the time."""
     cycle, oil = None, None
     if rng.random() < 0.7:
         if "coolant_film" in wanted:

@@ -49,7 +49,7 @@ class Sensors:
 
 
 class Fits:
-    """Linear fits of one case: the parameters' answers, priors, noise with what structure adds."""
+    """Linear fits of one case: responses to parameters, priors, noise including structure."""
 
     def __init__(self, plant: Plant, drives: list[Drive], built: dict[str, float], always: list[Act]) -> None:
         self.plant, self.drives, self.built, self.always = (
@@ -227,7 +227,7 @@ def write_run(folder: Path, stem: str, drive: Drive, readings: Array, about: tup
 
 
 def make_case(folder: Path, seed: int, number: int) -> dict[str, Any]:
-    """Draw, run, write one case; returns its answer."""
+    """Draw, run and write one case; return its answer."""
     rng = np.random.default_rng([seed, number])
     name = f"case_{number:04d}"
     family, wanted = choose(number, rng)

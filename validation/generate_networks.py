@@ -21,14 +21,14 @@ from .networks.scene import Owner, Run, draw_owner, run_machine
 from .networks.truth import Array, Change
 from .study_writer import study_options, write_study
 
-# What is drawn: every fifth case consistent, a seventh pairs, the families in turn.
+# Composition of the cases: every fifth case consistent, a seventh pairs, the families in turn.
 CYCLE = 5
 PAIR_SHARE = 0.18
 STRENGTHS = ((3.0, 20.0), (0.8, 2.5))
 FAINT_SHARE = 0.08
 MOST_MACHINES, TRIES_OF_FAMILY = 16, 4
 WEAKEST, STRONGEST = 0.15, 1.8  # times what the families draw
-# A mimic cannot be told from the truth where what it leaves beyond it is a third of noise and structure.
+# A mimic is indistinguishable from the truth if its further residual is a third of noise and structure.
 SAME_AS_TRUTH = 0.35
 UNSEEN_RATIO, FAINT_RATIO, CLEAR_RATIO = 0.5, 1.2, 2.5
 SECOND = ("hidden_heat", "changed_cooling", "changed_heat", "follows_load", "lying_sensor", "slow_sensor")
@@ -52,7 +52,7 @@ class Case:
 
 
 def choose(number: int, rng: np.random.Generator) -> list[str]:
-    """What a case conceals: nothing in every fifth, a pair in some, one of the families in turn else."""
+    """Effects that a case conceals: none in every fifth, a pair in some, else one of the families in turn."""
     turn, slot = divmod(number - 1, CYCLE)
     if slot == CYCLE - 1:
         return []
@@ -139,7 +139,7 @@ def draw_effects(
 
 
 def moved_over_noise(case: Case, effect: Concealed) -> float | None:
-    """By how many times its noise a hidden state moves the sensor that it moves most, median of intervals."""
+    """Largest response of a sensor to a hidden state over its noise, median of intervals."""
     if effect.shape is None or effect.intervals is None:
         return None
     change = run_with(case.owner, [effect]).truth - case.plain.truth
@@ -149,7 +149,7 @@ def moved_over_noise(case: Case, effect: Concealed) -> float | None:
 
 
 def identify(case: Case, effects: list[Concealed], each: list[Array]) -> dict[str, Any]:
-    """What is left before, with the truth beside the file's network, and with the best other effects."""
+    """Residuals before, with the truth beside the file's network, and with the best other effects."""
     study = _study(case, run_with(case.owner, effects))
     by_channel, x, left = _ratio(study)
     worst = int(by_channel.argmax())
@@ -255,7 +255,7 @@ def _effect_answer(case: Case, effect: Concealed) -> dict[str, Any]:
 
 
 def make_case(folder: Path, seed: int, number: int) -> dict[str, Any]:
-    """Draw, run, write one case; returns its answer.
+    """Draw, run and write one case; return its answer.
 
     Raises
     ------

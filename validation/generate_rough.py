@@ -24,7 +24,7 @@ from .rough import GRID, AsMounted, deviating_machine, draw_channels, draw_mount
 from .stepping import draw_as_built, run
 from .study_writer import study_options, write_study
 
-# What the cases conceal, in turn.
+# Contents of the cases, in turn.
 TURNS = ("consistent", "single", "single", "pair", "consistent", "single", "triple", "sensor_beside")
 # Slow differences between machine and definition last as long as the loads do, s.
 STRUCTURE_S = 4000.0
@@ -83,7 +83,7 @@ def read_channels(effects: list[Concealed], channels: tuple[int, ...]) -> bool:
 
 
 def with_twins(effects: list[Concealed], judged: dict[str, Any]) -> dict[str, Any]:
-    """What reads like the truth counts as right and makes the case ambiguous."""
+    """Count effects indistinguishable from the truth as right, and mark the case as ambiguous."""
     names = [e.effect for e in effects]
     for twin in judged["indistinguishable"]:
         at = names.index(twin.get("instead_of", names[0]))
@@ -104,7 +104,7 @@ def _place_names(component: str) -> list[str]:
 def make_case(
     folder: FilePath, nominal: ReducedSpindle, pool: list, seed: int, number: int, identified: bool = True
 ) -> dict[str, Any]:
-    """Draw, simulate, write one case; returns its answer.
+    """Draw, simulate and write one case; return its answer.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def _attempt(
     left = structure_left(nominal, plans, truths, (as_built, sensors, channels))
     structure = float(np.sqrt((left**2).mean()))
     sensor = float(np.sqrt(sensors.total_K**2 + sensors.rounding_K**2 / 12.0))
-    # What structure leaves is as slow as the loads: effects are judged against both.
+    # Structural residuals are as slow as the loads: effects are judged against both.
     judged_by = Noise(sensors.white_K, float(np.hypot(sensors.slow_K, structure)), STRUCTURE_S)
     effects: list[Concealed] = []
     known = None

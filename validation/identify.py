@@ -1,4 +1,4 @@
-"""What could be known: the effect after a re-fit of the machine, and what else would explain it.
+"""Identifiability: the effect after a re-fit of the machine, and what else would explain it.
 
 The machine's uncertain parameters are fitted (priors, calibration run and diagnosed run, the noise
 with its slow part) to the noise-free effect; then once more with each of a list of simple effects.
@@ -25,7 +25,7 @@ EVERY = 6
 MOST_ROUNDS, CONVERGED, SHORTEST = 20, 0.2, 0.05
 
 
-# What can only add: heat, mass, films and friction that grow, a reading that lags or nears the air's.
+# Effects that can only add: heat, mass, films and friction that grow, a reading that lags or nears the air's.
 ONE_SIDED = frozenset(
     {
         "seal_friction",
@@ -224,10 +224,10 @@ def perturbed(as_built: dict[str, float], name: str, change: float) -> dict[str,
 
 
 class Study:
-    """Fits of one case; answers are every ``EVERY`` steps of the drive.
+    """Fits of one case; responses are every ``EVERY`` steps of the drive.
 
     ``always`` acts in every run; ``channels`` are those that are recorded; ``earlier`` what the calibrations
-    truly read, where that is not what this model reads.
+    truly read, if this model would read something else.
     """
 
     def __init__(
@@ -336,7 +336,7 @@ class Study:
             rest = rest - apart @ amplitudes
             target = b - white @ amplitudes
         parameters = solve_triangular(self.r, self.q.T @ target)
-        # What the priors cost the true machine itself is not the effect's doing.
+        # The cost of the priors for the true machine itself is not due to the effect.
         return np.concatenate([parameters, amplitudes]), max(0.0, float(rest @ rest) - self._null)
 
     def fit_linear(self, change: NDArray[np.float64], extra: NDArray[np.float64]) -> tuple[float, float]:
@@ -352,7 +352,7 @@ class Study:
         column: NDArray[np.float64],
         beside: NDArray[np.float64] | None = None,
     ) -> tuple[float, float]:
-        """The same of a mimic, whose amplitude may not be what it cannot be, beside other columns (n, k)."""
+        """Fit a mimic, its amplitude within its limits, beside other columns (n, k)."""
         kept = np.empty((change.size, 0)) if beside is None else beside
         extra = np.column_stack([kept, column])
         solution, _ = self.solve(change, extra)

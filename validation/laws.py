@@ -1,7 +1,7 @@
-"""What was left out: laws of the concealed effects, richer than simple terms.
+"""Laws of the concealed effects, richer than simple terms.
 
 Each class is one physical effect with its parameters; the same class with its smooth onset, lag
-and exponent at their plain values serves as a mimic when it is asked what else could explain a
+and exponent at their plain values serves as a mimic when asking what else could explain a
 recording. Temperatures °C, times s, heat W.
 """
 

@@ -76,7 +76,7 @@ def material_of(part: str) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """What drawings and mounting leave open of a shape; all zero is the machine as drawn.
+    """Deviations of a shape that drawings and mounting leave open; all zero is the machine as drawn.
 
     ``outer`` relative change of the housing's outer radii; ``depth`` of the channel, outwards, and its
     ``shift`` along the axis, m; ``film`` relative change of the film along the helix, by cosines;
@@ -90,7 +90,7 @@ class Deviation:
     probes: tuple[tuple[float, float], ...] = ((0.0, 0.0),) * len(PROBES)
 
     def radius(self, drawn: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where lines of the drawing, m, truly are."""
+        """True positions of lines of the drawing, m."""
         knots = np.array([0.0, 0.105, CHANNEL_INNER, CHANNEL_OUTER, 0.121, 0.1255, 0.130, 0.2])
         moved = knots * np.where(knots > 0.1255, 1.0 + self.outer, 1.0)
         moved[2:4] += self.depth

@@ -41,7 +41,7 @@ def examples(recordings: Path) -> dict[str, tuple[Path, str, Path]]:
 
 
 def noise_of(answer: dict[str, Any]) -> float:
-    """What a right diagnosis can reach on held-out readings, K, sensors and structure together."""
+    """Smallest held-out error of a right diagnosis, K, sensors and structure together."""
     if "heldout_rmse_K_with_it" in answer:
         return float(answer["heldout_rmse_K_with_it"])
     return float(answer["noise"]["total_K"])

@@ -1,11 +1,11 @@
-"""Hold what ``diagnose --plan`` says beforehand against what diagnoses of the same recordings told.
+"""Compare predictions of ``diagnose --plan`` with diagnoses of the same recordings.
 
 ``python -m validation.plan_check RESULTS [--study DIR | --recordings DIR] [--only NAME ...]`` plans every
 case that hides one effect and has a diagnosis in RESULTS, with the case's machine, sensors, inputs and
 calibration recording, and compares. Answers are read for the concealed effect and its size only. Prints a
 table, leaves ``RESULTS/plan_check.json``.
 
-*Told apart*: the plan says that the concealed effect is seen and told from every other at its size; the
+*Told apart*: the plan says that the concealed effect is seen and distinguished from every other; the
 diagnosis must name it (``exactly``: and nothing beside it). *Not told apart*: the plan says that it is not
 seen, or not told from something; the diagnosis must not claim one set alone, with probability
 ``tuned.DECIDED`` (``nothing_wrong_claimed``: not a wrong one).
@@ -72,7 +72,7 @@ def multiple_of(item: Any, effect: dict[str, Any]) -> float:
 
 
 def held_against(planned: Any, answer: dict[str, Any], diagnosis: dict[str, Any]) -> dict[str, Any] | None:
-    """One case: what the plan said of the concealed effect, and what the diagnosis told."""
+    """Prediction of the plan about the concealed effect of one case, and outcome of the diagnosis."""
     from spindle_fem.inference import tuned
 
     effect = concealed(answer)
@@ -89,7 +89,7 @@ def held_against(planned: Any, answer: dict[str, Any], diagnosis: dict[str, Any]
     index = min(own, key=lambda i: components.index(plan.hypotheticals[i].component))
     multiple = multiple_of(plan.hypotheticals[index], effect)
     told_from = plan.separation.told_from[index]
-    # What counts as right beside it need not be told apart.
+    # Effects that also count as right need not be distinguished.
     accepted = [one for group in accepted_sets(answer) if len(group) == 1 for one in group]
     rivals = [
         j
@@ -137,7 +137,7 @@ def _listed(one: dict[str, Any]) -> dict[str, Any]:
 
 
 def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Shares that are asked for, with Wilson's intervals."""
+    """Required shares, with Wilson's intervals."""
 
     def share(kept: list[dict[str, Any]], of: list[dict[str, Any]]) -> dict[str, Any]:
         if not of:

@@ -2,7 +2,7 @@
 
 Every ``STUDY`` is a folder of one of the generators with ``answers`` and ``results``. Writes ``proof.json``
 (the rows of every case, the figures that follow from them, a worked case, real recordings), pictures, and
-``README.md``, which is rendered from ``proof.json`` alone, so that every number on it stands there.
+``README.md``, which is rendered from ``proof.json`` alone, so that every number on it is stored there.
 """
 
 import argparse
@@ -32,7 +32,7 @@ DIGITS = 4
 
 
 def rounded(value: Any) -> Any:
-    """The same with every real number to a few significant digits.
+    """Content with every real number rounded to a few significant digits.
 
     >>> rounded({"a": [1.234567, True, "x"]})
     {'a': [1.235, True, 'x']}
@@ -77,19 +77,19 @@ def read_study(study: Path, results: Path) -> dict[str, Any]:
 
 
 def figures_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """What follows from the rows: figures by family, reliability of stated probabilities."""
+    """Figures computed from the rows: by family, and reliability of stated probabilities."""
     seen = [r for r in rows if r["detectable"] and not r["failed"]]
     stated = [r | {"first": r["right"], "exact": False} for r in seen]
     return rounded({"summary": summary(rows), "reliability": reliability(stated)})
 
 
 def is_wrong(row: dict[str, Any]) -> bool:
-    """Whether a case has to be accounted for: what could be seen was not said, or what is not there was."""
+    """Whether a case counts as wrong: a detectable effect was missed, or an absent one claimed."""
     return bool(row["failed"] or (not row["right"] if row["detectable"] else row["confident_wrong"]))
 
 
 def worked_case(studies: dict[str, tuple[Path, Path, dict]], chosen: str | None) -> dict[str, Any] | None:
-    """One case from recording to held-out fit: the one asked for (STUDY/CASE), else the best with states."""
+    """One case from recording to held-out fit: the requested one (STUDY/CASE), else the best with states."""
     rows = [
         (name, row)
         for name, (_, _, told) in studies.items()
@@ -128,7 +128,7 @@ def worked_case(studies: dict[str, tuple[Path, Path, dict]], chosen: str | None)
 
 
 def real_machines(results: Path | None, recordings: Path | None) -> list[dict[str, Any]]:
-    """What was found on recordings of real machines, with what they are evidence of."""
+    """Findings on recordings of real machines, with what they are evidence of."""
     entries = tomllib.loads((HERE / "proof_real.toml").read_text(encoding="utf-8"))["recording"]
     out = []
     for entry in entries:
@@ -153,7 +153,7 @@ def real_machines(results: Path | None, recordings: Path | None) -> list[dict[st
 
 
 def riddles(book: Path | None) -> list[dict[str, Any]]:
-    """What was said of machines with the paper's two effects, from the folders that the book left."""
+    """Diagnoses of machines with the paper's two effects, from the folders that the book left."""
     out = []
     for folder in sorted(book.glob("riddle_*")) if book else ():
         result = folder / "results" / riddle.NAME
@@ -190,7 +190,7 @@ def build(
     real: tuple[Path | None, Path | None] = (None, None),
     book: Path | None = None,
 ) -> dict[str, Any]:
-    """Everything that the page says, as one table of data."""
+    """All content of the page, as one table of data."""
     told = {study.name: (study, results, read_study(study, results)) for study, results in studies}
     return {
         "schema": SCHEMA,
@@ -228,7 +228,7 @@ def wrong_of(study: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def kinds_of(study: dict[str, Any]) -> list[tuple[str, int]]:
-    """How many wrong cases each kind of cause has."""
+    """Number of wrong cases of each kind of cause."""
     return Counter(cause["kind"] for cause in study["causes"].values()).most_common()
 
 

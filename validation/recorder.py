@@ -1,4 +1,4 @@
-"""From true readings to a recording's files: noise, rounding, and what loggers do to rows."""
+"""Write a recording's files from true readings: noise, rounding, and how loggers treat rows."""
 
 import gzip
 from dataclasses import asdict, dataclass
@@ -29,11 +29,11 @@ class Noise:
 
     @property
     def total_K(self) -> float:
-        """Both together."""
+        """White and slow noise together, K."""
         return float(np.hypot(self.white_K, self.slow_K))
 
     def answer(self) -> dict[str, float]:
-        """As the answers hold it."""
+        """Noise in the form of the answers."""
         return asdict(self) | {"total_K": self.total_K}
 
 

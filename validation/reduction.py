@@ -1,6 +1,6 @@
 """Galerkin reduction of the finite volumes: small matrices, one for each coefficient.
 
-The basis spans the answers of the full model to every input (heat at each place, every
+The basis spans the responses of the full model to every input (heat at each place, every
 surrounding, the first shapes of oil temperature along the helix) at several rates of change and
 with every joint and film far from its nominal value, compressed by proper orthogonal
 decomposition in the norm of the heat capacity.

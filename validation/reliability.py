@@ -1,4 +1,4 @@
-"""How often a first set is right, by its evidence (``python -m validation.reliability STUDY=RESULTS``).
+"""How often a first set is right, given its evidence (``python -m validation.reliability STUDY=RESULTS``).
 
 Fits what :mod:`spindle_fem.inference.reliability` states, by maximum likelihood
 over diagnoses of concealed recordings that named something of the catalogue.

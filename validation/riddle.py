@@ -82,7 +82,7 @@ def concealed_effects() -> list[Concealed]:
 
 
 def write(folder: FilePath, seed: int, *, model: ReducedSpindle, calibrated: bool = False) -> dict[str, Any]:
-    """Write inputs and answer; returns the answer.
+    """Write inputs and answer; return the answer.
 
     ``calibrated`` adds an earlier run of the same machine, run-in at one speed and without either effect.
     """

@@ -49,7 +49,7 @@ def deviating_machine(seed: int, number: int, cache: Path | None) -> tuple[m.Dev
 
 @dataclass(slots=True)
 class AsMounted(Law):
-    """What hangs on a machine and what laws of its definition leave out.
+    """Additions to a machine and deviations of its laws from the definition.
 
     ``tool_kg`` at the nose; ``bracket`` from the flange to the rear body, W/K; ``top`` excess of the air
     above, K; ``ball`` relative growth of the balls' conductance to 3000 rpm; ``shape`` of the heat over speed
@@ -95,7 +95,7 @@ class AsMounted(Law):
             self.tool.act(moment)
 
     def answer(self, deviation: m.Deviation) -> dict[str, object]:
-        """As the answers hold it, with the shape."""
+        """Mounting and shape in the form of the answers."""
         return {
             "od": deviation.outer,
             "depth_mm": 1e3 * deviation.depth,
@@ -111,7 +111,7 @@ class AsMounted(Law):
 
 
 def draw_mounting(rng: np.random.Generator) -> AsMounted:
-    """What hangs on one machine, and the shape of its heat over speed."""
+    """Draw the additions to one machine, and the shape of its heat over speed."""
 
     def waves() -> tuple[tuple[float, float], ...]:
         return tuple((float(rng.normal(0.0, 0.03)), float(rng.uniform(0.0, 2.0 * np.pi))) for _ in range(2))

@@ -21,7 +21,7 @@ MACHINE = "recorded_spindle"
 
 
 def diagnose_case(inputs: Path, result: Path, machine: str, overrides: tuple[str, ...], report: bool) -> str:
-    """Diagnose one case, in this process; returns the verdict or what went wrong."""
+    """Diagnose one case, in this process; return the verdict or the error."""
     from spindle_fem.commands.diagnose_command import diagnose, diagnose_without_report
 
     result.mkdir(parents=True, exist_ok=True)
@@ -58,7 +58,7 @@ def outstanding(inputs: Path, results: Path, only: list[str] | None) -> list[str
 
 
 def not_concealed() -> list[str]:
-    """Effects of the catalogue that no case conceals, so that a study says nothing of them."""
+    """Effects of the catalogue that no case conceals, so that a study gives no evidence on them."""
     from spindle_fem.effects.registry import catalogue
 
     return sorted(set(catalogue()) - set(EVERY_EFFECT))

@@ -1,4 +1,4 @@
-"""Hold diagnoses against answers: ``python -m validation.score DIR RESULTS [--json FILE]``."""
+"""Score diagnoses against answers: ``python -m validation.score DIR RESULTS [--json FILE]``."""
 
 import argparse
 import itertools
@@ -33,14 +33,14 @@ def matches(found: list[dict[str, Any]], wanted: list[dict[str, Any]], *, place:
 
 
 def true_set(answer: dict[str, Any]) -> list[dict[str, Any]]:
-    """What was done, as a set of effects with accepted components."""
+    """Concealed effects as a set with accepted components."""
     return [{"effect": e["effect"], "components": e["acceptable_components"]} for e in answer["effects"]]
 
 
 def ranked_sets(diagnosis: dict[str, Any]) -> list[tuple[list[dict[str, Any]], float]]:
     """The findings and the alternatives with their probabilities, most probable first."""
     findings = diagnosis["findings"]
-    # A finding's own probability is its share of its set's, which stands beside it.
+    # A finding's own probability is its share of its set's, which is stored beside it.
     stated = diagnosis.get("set_probability")
     if stated is None:
         stated = min((f["probability"] for f in findings), default=1.0)
@@ -55,7 +55,7 @@ def first_right(answer: dict[str, Any], found: list[dict[str, Any]]) -> bool:
 
 
 def score_case(answer: dict[str, Any], diagnosis: dict[str, Any], wall: float | None) -> dict[str, Any]:
-    """Everything that one case says."""
+    """Scores of one case."""
     truth = true_set(answer)
     sets = ranked_sets(diagnosis)
     found, probability = sets[0]
@@ -126,9 +126,9 @@ def undecidable(answer: dict[str, Any]) -> bool:
 
 
 def changes_unseen(answer: dict[str, Any], diagnosis: dict[str, Any]) -> bool:
-    """Whether a sensor came off amid a held-out stretch: when it did, no reading that was fitted tells.
+    """Whether a sensor came off amid a held-out stretch, where no fitted reading shows the time.
 
-    Heat that comes and goes shows in the readings after the stretch; a lie leaves nothing behind.
+    Heat that comes and goes shows in the readings after the stretch; a sensor error leaves no trace.
     """
     moments = [
         effect["truth_form"].get("onset", 0.0) for effect in answer["effects"] if effect["kind"] == "sensor"
@@ -191,7 +191,7 @@ def same_extent(concealed: str, named: str) -> bool:
 
 
 def evenness(levels: list[float]) -> dict[str, Any]:
-    """How far p-values of consistent recordings are from even (Kolmogorov and Smirnov), and how many are low.
+    """Distance of the p-values of consistent recordings from uniform (Kolmogorov-Smirnov), and low ones.
 
     >>> evenness([0.1, 0.3, 0.5, 0.7, 0.9])["below_0.05"]
     0.0
@@ -231,7 +231,7 @@ def reliability(
 
 
 def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
-    """Figures over all cases, each with the number of cases it stands on."""
+    """Figures over all cases, each with its number of cases."""
     null = [r for r in rows if r["consistent"]]
     single = [r for r in rows if len(r["truth"]) == 1 and not r["foreign"]]
     clear = [r for r in single if r["clear"]]
@@ -330,7 +330,7 @@ def summarise(rows: list[dict[str, Any]], failed: list[str]) -> dict[str, Any]:
 def by_strength(
     rows: list[dict[str, Any]], edges: tuple[float, ...] = (0.0, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0, 1e9)
 ) -> list[dict[str, Any]]:
-    """What became of concealed effects, by the ratio of what they leave after a re-fit to the noise."""
+    """Outcome for concealed effects, by the ratio of what they leave after a re-fit to the noise."""
     out = []
     for low, high in itertools.pairwise(edges):
         here = [r for r in rows if r["truth"] and r["ratio"] is not None and low <= r["ratio"] < high]

@@ -1,4 +1,4 @@
-"""What every program of the comparison reads and reports; needs numpy alone.
+"""Input and report of every program of the comparison; needs numpy alone.
 
 A program is called as ``PYTHON run_NAME.py CASE_FOLDER OUTPUT.npz [--steps N]``.
 It prints one line of JSON: the seconds of each stage, iterations, threads, the
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-# Relative residual that every iterative solver is asked for; what it gives is compared in kelvin.
+# Relative residual required of every iterative solver; results are compared in kelvin.
 RELATIVE_TOLERANCE = 1e-8
 
 
@@ -52,7 +52,7 @@ class Problem:
 
     @property
     def conductivity(self) -> np.ndarray:
-        """Of each element, (n_elements,) [W/(m·K)]."""
+        """Conductivity of each element, (n_elements,) [W/(m·K)]."""
         return self.part_conductivity[self.part_of_element]
 
     @property
@@ -61,7 +61,7 @@ class Problem:
         return self.part_capacity[self.part_of_element]
 
     def flux(self, heat_factor: float = 1.0) -> np.ndarray:
-        """What each facet takes in at the start temperature, (n_facets,) [W/m²].
+        """Heat flux into each facet at the start temperature, (n_facets,) [W/m²].
 
         Unknowns count from the start temperature: round-off and relative
         tolerances then refer to the rise.
@@ -72,10 +72,10 @@ class Problem:
 
 @dataclass
 class Record:
-    """Seconds of stages and what else is told of one process.
+    """Seconds of stages and other figures of one process.
 
-    Processor seconds (of all threads of this process) tell more than those on
-    the wall where the machine has other work.
+    Processor seconds (of all threads of this process) are more reliable than wall time
+    where the machine has other work.
     """
 
     seconds: dict[str, float] = field(default_factory=dict)

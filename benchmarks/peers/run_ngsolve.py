@@ -11,7 +11,7 @@ import ngsolve as ngs
 import numpy as np
 import protocol
 
-# Of the change of one step, where other programs ask for 1e-8 of the whole rise.
+# Relative to the change of one step, where other programs use 1e-8 of the whole rise.
 CHANGE_TOLERANCE = 1e-6
 KIND = "local" if "--local" in sys.argv else "h1amg"
 if KIND == "local":

@@ -14,13 +14,13 @@ from skfem.helpers import dot, grad
 
 @BilinearForm
 def conduction(u, v, w):
-    """Of one conductivity per element."""
+    """Conduction form with one conductivity per element."""
     return w.conductivity * dot(grad(u), grad(v))
 
 
 @BilinearForm
 def storage(u, v, w):
-    """Of one volumetric capacity per element."""
+    """Storage form with one volumetric capacity per element."""
     return w.capacity * u * v
 
 

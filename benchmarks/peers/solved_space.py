@@ -48,7 +48,7 @@ class SolvedSpace:
         return answer
 
     def add(self, solution: NDArray[np.float64], guess: NDArray[np.float64] | None = None) -> None:
-        """Keep what is new in a solution, (n,); its guess from here, when given, tells what is not."""
+        """Add the new part of a solution, (n,); its guess from here, if given, shows which part is known."""
         place = self._added % len(self._basis)
         # the oldest goes first: what the new one has of it is to stay
         self._basis[place] = 0.0

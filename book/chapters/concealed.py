@@ -169,7 +169,7 @@ def _earlier_sections(desk: Desk) -> list[Section]:
 
 
 def _ordered(confusion: Mapping[str, Mapping[str, int]]) -> dict[str, dict[str, int]]:
-    """Rows by name; columns with the same names first, in the same order, then what else was said."""
+    """Rows by name; columns with the same names first, in the same order, then other findings."""
     down = sorted(confusion, key=lambda name: (name != "nothing", name))
     said = {name for row in confusion.values() for name in row}
     across = [name for name in down if name in said] + sorted(said - set(down))

@@ -1,4 +1,4 @@
-"""The models that stand between definition and diagnosis: networks, oil, fast model, transients, effects."""
+"""Models between definition and diagnosis: networks, oil, fast model, transients, effects."""
 
 from __future__ import annotations
 

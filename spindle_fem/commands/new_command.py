@@ -31,7 +31,7 @@ _NOSE, _SPACER, _BETWEEN, _END = 40.0, 20.0, 160.0, 64.0
 
 @dataclass(frozen=True, slots=True)
 class NewMachine:
-    """What a machine to start from has.
+    """Options for a machine definition to start from.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ def _sizes(designation: str, where: str) -> tuple[float, float, float, float, fl
 
 
 def _values(chosen: NewMachine) -> dict[str, str]:
-    """What the template leaves open."""
+    """Values of the template's placeholders."""
     bore, outside, width, shoulder, lip = _sizes(chosen.front, "--front")
     small, rear_outside, rear_width, rear_shoulder, _ = _sizes(chosen.rear, "--rear")
     if small > bore - 5.0:

@@ -43,25 +43,25 @@ class Lubrication(SpecModel):
     """
 
     kind: LubricationKind
-    """How the oil gets to the balls."""
+    """Way of supplying the oil to the balls."""
     oil: Literal[tuple(OILS)] | None = None
     """A mineral oil that ships, which gives its viscosities and density where they are missing."""
     kinematic_viscosity_40: OilViscosity
-    """At 40 °C."""
+    """Kinematic viscosity at 40 °C."""
     kinematic_viscosity_100: OilViscosity
-    """At 100 °C."""
+    """Kinematic viscosity at 100 °C."""
     density: Density = 870.0
-    """At 15 °C."""
+    """Density at 15 °C."""
     pressure_viscosity: PressureViscosity = 2.0e-8
     """Coefficient at ambient pressure."""
     thermal_conductivity: Conductivity = 0.13
-    """Of the oil in the contacts."""
+    """Thermal conductivity of the oil in the contacts."""
     oil_flow: OilFlow
     """Through each bearing: oil-air some 0.1 to 1 cm³/h, jets 0.5 to 5 L/min."""
     air_flow: VolumeFlow | None = None
     """Through each bearing with ``kind = "oil_air"``, at 20 °C and 1.013 bar: some 20 to 60 L/min."""
     inlet_temperature: Temperature
-    """Of the oil, or of the air with its oil, as it enters the bearing."""
+    """Temperature of the oil, or of the air with its oil, at the inlet of the bearing."""
     palmgren_f0: PositiveNumber | None = None
     """Palmgren's lubrication factor of a row; that of the kind where none is given."""
     path_fill: OilShare | None = None
@@ -72,7 +72,7 @@ class Lubrication(SpecModel):
     film_starvation: FilmShare = 1.0
     """Film over the fully flooded one."""
     film_factor: UncertainNumber = Uncertain(1.0)
-    """On the coefficient between raceways and what flows."""
+    """Factor on the coefficient between raceways and stream."""
     temperature_limit: Temperature = 373.15
     """The oil is checked against it."""
 
@@ -100,34 +100,34 @@ class LubricationFilm(StreamFilm):
     kind: Literal["lubrication"]
     """Tells the films apart."""
     name: Name
-    """That of the bearing and ``.lubrication``."""
+    """Name of the bearing and ``.lubrication``."""
     bearing: Name
-    """Whose raceways it wets."""
+    """Bearing whose raceways it wets."""
     lubrication: Lubrication
-    """Of the set."""
+    """Lubrication of the set."""
     pitch_diameter: PositiveLength
-    """Of the row."""
+    """Pitch diameter of the row."""
     element_diameter: PositiveLength
-    """Of ball or roller."""
+    """Diameter of ball or roller."""
     axial_cosine: Annotated[float, Field(ge=0.0, le=1.0)]
     """Cosine of the contact angle."""
     inner_diameter: PositiveLength
-    """Of the annulus between the rings."""
+    """Inner diameter of the annulus between the rings."""
     outer_diameter: PositiveLength
-    """Of the annulus between the rings."""
+    """Outer diameter of the annulus between the rings."""
     rolls_on_balls: bool
     """Or on rollers."""
     factor: UncertainNumber = Uncertain(1.0)
-    """On the coefficient."""
+    """Factor on the coefficient."""
 
     @property
     def inlet_temperature(self) -> float:
-        """Of what flows as it enters, K."""
+        """Temperature of the stream at the inlet, K."""
         return self.lubrication.inlet_temperature
 
     @property
     def flow(self) -> float:
-        """Of what carries the heat, air or oil, m³/s."""
+        """Flow of the fluid that carries the heat, air or oil, m³/s."""
         return self.lubrication.air_flow or self.lubrication.oil_flow
 
     @property

@@ -346,7 +346,7 @@ class MachineSpec(SpecModel):
         return self
 
     def lubricant_of(self, group: BearingSet) -> Grease | Lubrication | None:
-        """What lubricates a set: its own oil, or the machine's grease."""
+        """Lubricant of a set: its own oil, or the machine's grease."""
         return group.lubrication or self.grease
 
     @property

@@ -1,4 +1,4 @@
-"""What films of flowing fluids have in common: a fluid of its own that warms along its walls."""
+"""Common base of films of flowing fluids: a separate fluid that warms along its walls."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class StreamFilm(SpecModel):
 
     @property
     def temperature(self) -> float:
-        """Of the fluid as it enters, K."""
+        """Temperature of the fluid at the inlet, K."""
         return self.inlet_temperature
 
     @property

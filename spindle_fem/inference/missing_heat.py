@@ -1,4 +1,4 @@
-"""Where and when heat is missing: regularised inversion of the residual, place by place.
+"""Place and time of missing heat: regularised inversion of the residual, place by place.
 
 For every place the response of all channels to heat that begins at each of a
 row of instants is marched through the linear model. From these responses follow

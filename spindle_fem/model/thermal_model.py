@@ -158,7 +158,7 @@ class ThermalModel:
 
     @classmethod
     def load(cls, path: Path) -> ThermalModel | None:
-        """What :meth:`save` wrote; None where there is none, or another version, or a damaged file."""
+        """Read a model that :meth:`save` wrote; None if missing, of another version, or damaged."""
         found = load_record(path, FORMAT, cls)
         if found is None:
             return None
@@ -170,7 +170,7 @@ class ThermalModel:
 def project(model: ThermalModel, basis: Array, one: Array) -> ThermalModel:
     """Galerkin projection of a model: dense, with every name and coefficient of the model.
 
-    Its unknowns ``u`` stand for ``basis @ u``; every operator is ``Vᵀ K_i V``.
+    Its unknowns ``u`` represent ``basis @ u``; every operator is ``Vᵀ K_i V``.
 
     Parameters
     ----------

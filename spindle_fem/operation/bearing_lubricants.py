@@ -16,7 +16,7 @@ from spindle_fem.validity import CodedWarning
 
 
 class SetLubricant:
-    """What lubricates one bearing set, and what that makes of friction.
+    """Lubricant of one bearing set, and its influence on friction.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class SetLubricant:
         )
 
     def warnings(self, options: HeatOptions) -> tuple[CodedWarning, ...]:
-        """What a heat model leaves out of this lubrication."""
+        """Effects of this lubrication that a heat model leaves out."""
         if self.kind is None or not self.kind.churns or options.level != "skf":
             return ()
         text = (
@@ -84,7 +84,7 @@ def lubrication_oil(lubrication: Lubrication) -> Coolant:
 
 
 def bearing_stream(film: LubricationFilm, speed: float) -> BearingStream:
-    """What flows through a bearing at a speed [rad/s]."""
+    """Streams of oil and air through a bearing at a speed [rad/s]."""
     own = film.lubrication
     return BearingStream(
         oil=lubrication_oil(own),

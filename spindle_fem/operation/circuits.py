@@ -49,7 +49,7 @@ def stream_answer(film: StreamFilm, speed: float) -> StreamAnswer:
 
 
 def stream_warnings(film: StreamFilm, answer: StreamAnswer) -> tuple[CodedWarning, ...]:
-    """What leaves the range of a stream's laws."""
+    """Warnings of values outside the range of a stream's laws."""
     if not answer.faults:
         return ()
     text = f"Circuit {film.name}: {'; '.join(answer.faults)} ({answer.source})."

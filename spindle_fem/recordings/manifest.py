@@ -47,7 +47,7 @@ Table = TypeVar("Table", bound=_ManifestModel)
 
 
 class TimeColumn(_ManifestModel):
-    """Where the time stands."""
+    """Time column and its unit."""
 
     column: str
     """Column of the data file. Rows may be repeated or out of order."""
@@ -57,23 +57,23 @@ class TimeColumn(_ManifestModel):
 
 
 class Channel(_ManifestModel):
-    """One column and what it means."""
+    """One column and its meaning."""
 
     column: str
-    """Column of the data file; one channel a column. Columns without a channel are left out and counted."""
+    """Column of the data file; one channel per column. Columns without a channel are left out and counted."""
     role: Literal["temperature", "displacement", "input", "covariate"]
-    """What it is to the model; which keys it takes follows, see below."""
+    """Role in the model; it determines the other keys, see below."""
     unit: str | None = None
     """Unit of the column, such as `degC`, `rpm`, `l/min`, `percent`. A covariate without one is a pure
     number."""
     probe: str | None = None
-    """What reads it: a probe or a network node of the machine; of a displacement, a
+    """Sensor: a probe or a network node of the machine; for a displacement, a
     `[[displacement_sensor]]`."""
     sigma: float | None = None
     """White noise, one standard deviation: above 0, in K, of a displacement in its unit. Measured from the
     readings where it is not given."""
     drives: str | None = None
-    """What it drives, one channel for each, see below."""
+    """Input that it drives, one channel for each, see below."""
     hold: Literal["previous", "linear"] | None = None
     """Between readings: the last one holds, or a straight line, which none given means too."""
 
@@ -84,9 +84,9 @@ class Manifest(_ManifestModel):
     schema_: Annotated[Literal["spindle-fem/recording/1"], Field(alias="schema")]
     """Form of this file."""
     name: str
-    """What reports call the recording."""
+    """Name of the recording in reports."""
     description: str = ""
-    """For whoever reads the file."""
+    """Free text."""
     data: str
     """File beside the manifest that ends in `.csv`, `.csv.gz` or `.parquet`; for `watch` also `-`, standard
     input."""

@@ -59,7 +59,7 @@ class OutputHelpers:
         self._charts.close()
 
     def prepare(self, spec: MachineSpec, mesh: TaggedMesh, order: int, n_unknowns: int) -> None:
-        """Do what mesh and definition tell alone."""
+        """Start the work that needs only mesh and definition."""
         self._pictures.ask("prepare", mesh, n_unknowns)
         self._charts.ask("draw_definition", spec)
         self._charts.ask("prepare_growth", spec, mesh, order)
@@ -286,7 +286,7 @@ class _ChartWorker:
         return self._result.growth, self._result.displacements
 
     def write_growth(self) -> float:
-        """Write the growth of the bodies and the picture of the deformed machine; seconds."""
+        """Write the growth of the bodies and the picture of the deformed machine; return the seconds."""
         from spindle_fem.report.growth_chart import deformed_machine
         from spindle_fem.results.dataset import write_dataset
         from spindle_fem.results.growth_file import GROWTH_GROUP, growth_dataset

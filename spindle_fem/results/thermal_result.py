@@ -290,7 +290,7 @@ class ThermalResult(Presented):
         return rows
 
     def with_shape(self, growth: Growth | None, displacements: Mapping[str, float]) -> ThermalResult:
-        """The same result with :attr:`growth` and :attr:`displacements` as another process found them."""
+        """Copy with :attr:`growth` and :attr:`displacements` from another process."""
         shaped = replace(self)
         shaped.__dict__.update(growth=growth, displacements=dict(displacements))
         return shaped

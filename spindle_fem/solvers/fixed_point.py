@@ -22,7 +22,7 @@ REFUSED = (NoEquilibriumError, OutOfValidityError)
 
 @dataclass(frozen=True, slots=True)
 class Iteration:
-    """How a fixed point is approached.
+    """Settings of a fixed-point iteration.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Mixing:
         self.inputs, self.outputs = [], []
 
     def next(self, given: Array, found: Array) -> Array:
-        """Where to go from an iterate and its image."""
+        """Next iterate, from an iterate and its image."""
         if float(np.abs(found - given).max(initial=0.0)) > self.iteration.mixing_below:
             self.restart()
             return given + self.iteration.relaxation * (found - given)

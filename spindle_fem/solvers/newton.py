@@ -83,7 +83,7 @@ def _iterated(balance: SparseBalance, start: Array, enough: float) -> tuple[Arra
 
 
 def _marched(balance: SparseBalance, start: Array) -> Array | None:
-    """Where implicit steps in time lead, every node given the capacity of its own losses; None if nowhere.
+    """State reached by implicit time steps, with each node's capacity set to its losses; None if none.
 
     Cold grease may rub more as it warms: there Newton's step points away from where the machine warms to,
     and steps in time, longer as less happens in them, follow it (pseudo-transient continuation).

@@ -1,4 +1,4 @@
-"""From a definition to a checked result: the function behind ``spindle-fem run``."""
+"""Solve a machine from its definition to a checked result, as ``spindle-fem run`` does."""
 
 from __future__ import annotations
 
@@ -325,7 +325,7 @@ def _lubricants(spec: MachineSpec, bearings: Mapping[str, BearingResult]) -> Ite
 def _circuits(
     machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState
 ) -> dict[str, CircuitResult]:
-    """What every stream beside the channel did."""
+    """Flow, heat and film of every stream beside the channel."""
     found = {}
     outlets = circuit_outlets(machine, coupled.solution, coupled.loads)
     for film in machine.spec.circuits:

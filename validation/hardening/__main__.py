@@ -88,7 +88,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _told(future: Future[dict[str, Any]], family: str, number: int) -> dict[str, Any]:
-    """What a case found; a trial that itself failed is a fault, and the others go on."""
+    """Result of a case; a trial that itself failed is a fault, and the others continue."""
     error = future.exception()
     if error is None:
         return future.result()
@@ -96,7 +96,7 @@ def _told(future: Future[dict[str, Any]], family: str, number: int) -> dict[str,
 
 
 def _planned(given: argparse.Namespace) -> dict[str, int]:
-    """How many cases of each family are asked for."""
+    """Number of requested cases of each family."""
     counts = SHORT if given.short else {name: count for name, (_, count) in FAMILIES.items()}
     chosen = {name: count for name, count in counts.items() if name in (given.only or counts)}
     return {name: min(count, given.cases or count) for name, count in chosen.items()}

@@ -21,7 +21,7 @@ import xarray
 import spindle_fem
 from spindle_fem.units import registry
 
-# What is asked of every case: seconds of processor, and memory.
+# Limits of every case: seconds of processor, and memory.
 MOST_SECONDS, MOST_MB = 30.0, 2048.0
 # A process that waits uses no processor: what it may take in all on a machine that does other work too.
 MOST_WALL_SECONDS = 120.0
@@ -33,7 +33,7 @@ WIDE = "200"
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """How a process ended.
+    """End of a process.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Ended:
 
 @dataclass(slots=True)
 class Surroundings:
-    """What a process finds around it.
+    """Environment of a process.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ def run_function(function: Callable[[], int], folder: Path, around: Surroundings
 def run_process(
     arguments: Sequence[str], folder: Path, around: Surroundings | None = None, *, prefix: Sequence[str] = ()
 ) -> Ended:
-    """The same command in an interpreter of its own."""
+    """Run the command in an interpreter of its own."""
     around = around or Surroundings()
     with _Streams(folder) as (out, err):
         started = time.perf_counter()

@@ -18,7 +18,7 @@ from .studies import try_study
 from .surroundings import TRIALS, try_surroundings
 from .texts import try_text
 
-# Of each family: what tries one case, and how many cases there are.
+# For each family: function that tries one case, and number of cases.
 FAMILIES = {
     "definitions": (try_definition, 2000),
     "recordings": (try_recording, 1000),
@@ -31,13 +31,13 @@ FAMILIES = {
 # Where a command runs, and what it may leave beside that.
 HERE = "here"
 BESIDE = frozenset({HERE, f"{HERE}.out", f"{HERE}.err"})
-# What hostile texts would write, and how they would stand in a page that runs them.
+# Files that hostile texts would write, and how the texts would appear in a page that runs them.
 OUTSIDE = ("outside", "/tmp/outside")
 LIVE = ("<script>alert(1)", "<img src=x")
 
 
 def try_case(family: str, number: int, seed: int, place: Path) -> dict[str, Any]:
-    """One case, in a folder of its own that stays where it shows a fault."""
+    """Try one case in its own folder, which is kept if it shows a fault."""
     folder = place / "work" / f"{family}_{number:04d}"
     shutil.rmtree(folder, ignore_errors=True)
     here = folder / HERE
@@ -50,7 +50,7 @@ def try_case(family: str, number: int, seed: int, place: Path) -> dict[str, Any]
 
 
 def _look_round(record: Record, folder: Path) -> None:
-    """Nothing was written but what was asked for, and no page runs a text of the input."""
+    """Check that only the requested output was written, and that no page runs a text of the input."""
     beside = {item.name for item in folder.iterdir()} - BESIDE
     if beside or any(os.path.lexists(name) for name in OUTSIDE if os.path.isabs(name)):
         record.fault(f"wrote outside its folder: {', '.join(sorted(beside)) or OUTSIDE[1]}")

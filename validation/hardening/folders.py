@@ -31,7 +31,7 @@ COMMANDS = {
 
 
 class Poison:
-    """What runs a command when it is unpickled."""
+    """Object that runs a command when it is unpickled."""
 
     def __reduce__(self) -> tuple[object, tuple[str]]:
         return os.system, ("touch outside",)
@@ -105,7 +105,7 @@ def _other_bytes(chance: random.Random, file: Path, content: bytes) -> str:
 
 
 def _other_tables(chance: random.Random, file: Path, content: bytes) -> str:
-    """The same changes as of definitions, written in the form of the file."""
+    """Apply the mutations of definitions, written in the form of the file."""
     tree = json.loads(content) if file.suffix == ".json" else tomllib.loads(content.decode())
     tree = tree if isinstance(tree, dict) else {"list": tree}
     without_null = json.loads(json.dumps(tree), object_hook=_filled)
@@ -143,7 +143,7 @@ def _try_cache(record: Record, chance: random.Random, folder: Path, originals: P
 
 
 def _load_model(file: Path, sound: bytes) -> int:
-    """Status 0 where an entry is read as it was, or not at all: then the model is made again."""
+    """Status 0 if an entry is read as it was, or not at all: then the model is made again."""
     from spindle_fem.model.thermal_model import ThermalModel
 
     found = ThermalModel.load(file)

@@ -1,4 +1,4 @@
-"""What a case came to: accepted, refused with a reason, or a fault of the program."""
+"""Outcome of a case: accepted, refused with a reason, or a fault of the program."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from .child import MOST_MB, MOST_SECONDS, Ended
 
 ACCEPTED, REFUSED, FAULT = "accepted", "refused", "fault"
-# Of a refusal: the error's name with where, what and how to fix, or a usage error of the parser.
+# Reason of a refusal: the error's name with where, what and how to fix, or a usage error of the parser.
 _REASON = re.compile(r"^(\w+Error: \S.*|.*\bError\b.*)$", re.MULTILINE)
 REASON_LENGTH = 400
 BAD_INPUT, OTHER_REFUSAL = 2, 1
@@ -73,11 +73,11 @@ class Record:
             self.outcome, self.reason = ACCEPTED, ""
 
     def long_work(self) -> None:
-        """What was asked for takes longer than a case may: no fault where the work was under way."""
+        """Accept work longer than the limit of a case, if it was under way."""
         self.outcome, self.ran, self.ran_outcome, self.reason = ACCEPTED, "long", ACCEPTED, ""
 
     def as_dict(self) -> dict[str, Any]:
-        """Of the JSON line."""
+        """Content of the JSON line."""
         return asdict(self)
 
 

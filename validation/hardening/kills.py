@@ -30,13 +30,13 @@ EARLIER = 0.5
 
 
 def kind_of(number: int) -> str:
-    """What the kill of this number hits."""
+    """Target of the kill of this number."""
     kinds = [name for name, count in KILLS.items() for _ in range(count)]
     return kinds[number - 1]
 
 
 def try_kill(number: int, chance: random.Random, folder: Path) -> Record:
-    """One kill, a look at what it left, and the same command again."""
+    """Kill once, inspect the remains, and run the same command again."""
     kind = kind_of(number)
     record = Record("kills", number, [kind])
     originals = folder.parents[2] / ORIGINALS
@@ -93,7 +93,7 @@ def _killed(arguments: list[str], folder: Path, around: Surroundings, moment: fl
 
 
 def _look_at(record: Record, kind: str, folder: Path, originals: Path) -> None:
-    """What was left is marked, or whole, or refused; entries of the cache are whole."""
+    """Check that remains are marked, or whole, or refused; entries of the cache are whole."""
     for entry in (folder / "cache").glob("*.npz"):
         with np.load(entry, allow_pickle=False) as data:
             for name in data.files:

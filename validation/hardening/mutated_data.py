@@ -1,4 +1,4 @@
-"""What may happen to the data of a recording: to cells, columns, rows, times, and the file's form."""
+"""Mutations of a recording's data: cells, columns, rows, times, and the file's form."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may happen to a TOML file: to its tables, and to its bytes."""
+"""Mutations of a TOML file: of its tables, and of its bytes."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def paths(tree: Any, at: Path = ()) -> list[Path]:
 
 
 def value_at(tree: Any, path: Path) -> Any:
-    """What stands at a path."""
+    """Value at a path."""
     for key in path:
         tree = tree[key]
     return tree
@@ -90,7 +90,7 @@ def drop(chance: random.Random, tree: dict[str, Any]) -> str:
 
 
 def misspell(chance: random.Random, tree: dict[str, Any]) -> str:
-    """Write a key wrong, or add one that nobody knows."""
+    """Misspell a key, or add an unknown one."""
     table = _some(chance, tree, lambda value: isinstance(value, dict) and bool(value))
     inside = tree if table is None else value_at(tree, table)
     if not inside:
@@ -157,7 +157,7 @@ def exchange(chance: random.Random, tree: dict[str, Any]) -> str:
 
 
 def hostile_text(chance: random.Random, tree: dict[str, Any]) -> str:
-    """A text that means something elsewhere; wherever the old text stood, as a rename would have it."""
+    """Insert a text that means something elsewhere wherever the old text occurred, as a rename would."""
     path = _some(chance, tree, lambda value: isinstance(value, str))
     if path is None:
         return ""
@@ -261,7 +261,7 @@ def spoilt_bytes(chance: random.Random, content: bytes) -> tuple[bytes, str]:
 
 # A null, marks of other encodings, half a character, another end of line, what opens and never closes.
 PIECES = (b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\xed\xa0\x80", b"\r\n", b'"""', b"[[")
-# Of all files: how many are spoilt as bytes, and how many changed mildly, so that they can be run.
+# Shares of all files mutated as bytes, and mutated mildly, so that they can be run.
 SHARE_BYTES, SHARE_MILD = 0.12, 0.55
 MOST_CHANGES = 3
 

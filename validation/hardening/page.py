@@ -1,4 +1,4 @@
-"""What the cases came to, as a table of results and as the page of the documentation."""
+"""Results of the cases as a table and as the page of the documentation."""
 
 from __future__ import annotations
 

@@ -15,13 +15,13 @@ from .mutations import mutated
 
 EVERY_PROCESS = 50
 SHARE_DATA, SHARE_MANIFEST = 0.7, 0.45
-# Of twenty cases, how many go to each command.
+# Of twenty cases, the number for each command.
 COMMANDS = {"simulate": 8, "show": 4, "draft": 4, "simulate_spindle": 2, "watch": 1, "diagnose": 1}
 WRITTEN = frozenset({"out", "out.png"})
 
 
 def try_recording(number: int, chance: random.Random, folder: Path) -> Record:
-    """One spoilt recording, given to one of the commands that read recordings."""
+    """One mutated recording, given to one of the commands that read recordings."""
     record = Record("recordings", number)
     order = [name for name, share in COMMANDS.items() for _ in range(share)]
     command = order[number % len(order)]

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-# What differs from run to run, or from place to place.
+# Keys that differ from run to run, or from place to place.
 _OF_THE_RUN = re.compile(r"wall|rss|timing|seconds|_time_s|versions|folder|path|pictured|scheduler")
-# Of each command: the file that holds what it found.
+# Main result file of each command.
 MAIN_FILES = {
     "run": "summary.json",
     "sweep": "results.csv",
@@ -23,7 +23,7 @@ MAIN_FILES = {
 
 
 def numbers_of(file: Path) -> dict[str, Any]:
-    """Everything that a file tells but for times and places, by its path in the file."""
+    """Everything in a file except times and places, by its path in the file."""
     if file.suffix == ".csv":
         with file.open(encoding="utf-8", newline="") as stream:
             rows = list(csv.DictReader(stream))
@@ -44,7 +44,7 @@ def _leaves(value: Any, at: str) -> Iterator[tuple[str, Any]]:
 
 
 def difference(one: Path, other: Path) -> str:
-    """What differs between two files of numbers; empty where nothing does."""
+    """First difference between two files of numbers; empty if there is none."""
     if not one.is_file():
         return f"there is no {one.name}"
     first, second = numbers_of(one), numbers_of(other)

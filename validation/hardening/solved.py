@@ -1,6 +1,6 @@
 """Accepted machines solved: by elements, by their own network, or as the network that they are; with checks.
 
-Each function ends as a command does: status 0, or that of the error, which is told.
+Each function returns a command's status: 0, or that of the error, which is printed.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 LARGEST_IMBALANCE = 1.0e-8
-# What rounding leaves of the rule that nothing is colder than all its surroundings, K.
+# Rounding error allowed in the rule that nothing is colder than all its surroundings, K.
 BELOW_COLDEST = 0.01
-# What drives a written network here: a room, and any source, in SI.
+# Inputs of a written network here: a room, and any source, in SI.
 ROOM, SOURCE = 293.15, 10.0
 
 

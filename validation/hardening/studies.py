@@ -11,13 +11,13 @@ from .material import BALL, COARSE, ROLLER, SPINDLE, SWEEP, TRANSIENT, tables
 from .mutations import mutated
 
 EVERY_PROCESS = 50
-# Of ten cases, how many go to each file: bearings are quick.
+# Of ten cases, the number for each file: bearings are quick.
 FILES = {"ball": 5, "roller": 2, "sweep": 2, "transient": 1}
 TEXTS = {"ball": BALL, "roller": ROLLER, "sweep": SWEEP, "transient": TRANSIENT}
 
 
 def try_study(number: int, chance: random.Random, folder: Path) -> Record:
-    """One spoilt study or bearing file, given to its command."""
+    """One mutated study or bearing file, given to its command."""
     record = Record("studies", number)
     order = [name for name, share in FILES.items() for _ in range(share)]
     kind = order[number % len(order)]
@@ -29,7 +29,7 @@ def try_study(number: int, chance: random.Random, folder: Path) -> Record:
         "transient": ["transient", "file.toml", "-o", "out", *COARSE],
     }.get(kind, ["bearing", "file.toml", "--json"])
     run = run_process if number % EVERY_PROCESS == 0 else run_command
-    # What is read well may be impossible: no equilibrium of a bearing, no steady state of a machine.
+    # A file that is read well may be impossible: no equilibrium of a bearing, no steady state of a machine.
     record.step(kind, ended := run(arguments, folder), (2, OTHER_REFUSAL))
     if ended.stopped == "time" and (folder / "out" / "INCOMPLETE").is_file():
         record.long_work()

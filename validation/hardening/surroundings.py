@@ -21,7 +21,7 @@ from .same_numbers import MAIN_FILES, difference
 
 # Largest file that a full disk takes, bytes: a message, less and more than tables, pictures and fields.
 SIZES = (600, 4_000, 60_000, 400_000)
-# What writes: folders as in the material, and single files.
+# Commands that write: folders as in the material, and single files.
 SINGLE_FILES = {
     "mesh": ("mesh", SPINDLE, "-o", "out.vtu", *COARSE),
     "step": ("mesh", SPINDLE, "-o", "out.step"),
@@ -57,13 +57,13 @@ def _compare(record: Record, kind: str, out: Path, originals: Path) -> None:
 
 
 def _finish(record: Record, kind: str, folder: Path, originals: Path) -> None:
-    """The same command with room: it succeeds, with the same numbers."""
+    """Run the command again with room: it succeeds, with the same numbers."""
     record.step("again", run_command(_arguments(kind), folder, Surroundings(patience_s=PATIENT)))
     _compare(record, kind, folder / "out", originals)
 
 
 def _full_disk(kind: str, size: int, record: Record, folder: Path, originals: Path) -> None:
-    """No file grows beyond a size: the system says so as it does of a full disk, but for the number."""
+    """No file grows beyond a size: the system reports it like a full disk, except for the error number."""
 
     def limit() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

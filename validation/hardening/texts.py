@@ -25,7 +25,7 @@ def count() -> int:
 
 
 def try_text(number: int, chance: random.Random, folder: Path) -> Record:
-    """One text in the place of every name."""
+    """One text in place of every name."""
     if number > len(HOSTILE):
         text = HOSTILE[RUN[number - len(HOSTILE) - 1]]
         return _try_run(Record("texts", number, [text[:40]]), text, folder)
@@ -82,7 +82,7 @@ def _try_run(record: Record, text: str, folder: Path) -> Record:
 
 
 def _imported(file: Path) -> int:
-    """Load an exported module, which runs whatever stands in it."""
+    """Load an exported module, which runs its code."""
     found = importlib.util.spec_from_file_location("exported", file)
     module = importlib.util.module_from_spec(found)
     found.loader.exec_module(module)

@@ -49,7 +49,7 @@ def body(moment: Moment, memory: dict, place: str, capacity: float, conductance:
 
 @dataclass(slots=True)
 class Mounted:
-    """What a machine has beside its definition: a tool, balls that conduct with speed, heat's other shape."""
+    """Additions to a machine's definition: a tool, balls that conduct with speed, heat's other shape."""
 
     tool_J_K: float = 0.0
     ball: float = 0.0
@@ -75,7 +75,7 @@ class Mounted:
 
 @dataclass(slots=True)
 class Lie:
-    """What one channel reads wrongly."""
+    """Error of one channel."""
 
     kind: str
     channel: int
@@ -111,7 +111,7 @@ LIES = {
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Where an effect is drawn."""
+    """Basis on which an effect is drawn."""
 
     rng: np.random.Generator
     plant: Plant

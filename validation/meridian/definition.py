@@ -13,7 +13,7 @@ GEOMETRY = Path(__file__).parents[2] / "geometry"
 _NUMBER = re.compile(r"^\s*([-+0-9.eE]+)\s*(\S.*)?$")
 _SCALES = {"mm": 1e-3, "m": 1.0, "W": 1.0, "N": 1.0, "rpm": 1.0, "W/K": 1.0, "J/K": 1.0, "W/m**2/K": 1.0}
 _SCALES |= {"W/m/K": 1.0, "kg/m**3": 1.0, "J/kg/K": 1.0, "degC": 1.0, "K": 1.0, "deg": 1.0}
-# Tables that only the heat laws which are not used ask for, or that say how the package meshes.
+# Tables needed only by heat laws that are not used, or for the package's mesh.
 _LENGTHS = ("part", "bearing_types", "bearing_set", "surface", "probe")
 
 

@@ -219,7 +219,7 @@ def _joints(b: _Builder, size: int) -> dict[str, sparse.csc_matrix]:
 
 
 def _set_beside(tables: dict[str, Any], contact: str) -> str:
-    """Bearing set at a contact of rings or spacers, told by the letter that their names share."""
+    """Bearing set at a contact of rings or spacers, identified by the letter that their names share."""
     letters = {name[0].upper() for name in contact.split("|")}
     return next(s["name"] for s in tables["bearing_set"] if s["name"][0].upper() in letters)
 

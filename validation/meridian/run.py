@@ -136,7 +136,7 @@ class Plant:
 
 
 def every(drive: Drive, number: int) -> Drive:
-    """One step of ``number``."""
+    """Every ``number``-th step."""
     return replace(drive, **{f: getattr(drive, f)[::number] for f in drive.__slots__})
 
 
@@ -207,6 +207,6 @@ def run(plant: Plant, drive: Drive, built: dict[str, float], acts: Sequence[Act]
 
 
 def draw_as_built(rng: np.random.Generator, plant: Plant) -> dict[str, float]:
-    """One machine from the priors, cut at 2 sigma."""
+    """Draw one machine from the priors, truncated at 2 sigma."""
     draws = {k: float(np.clip(rng.standard_normal(), -2.0, 2.0)) * s for k, s in plant.priors().items()}
     return {k: x if k == "split" else float(np.exp(x)) for k, x in draws.items()}

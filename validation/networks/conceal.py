@@ -1,4 +1,4 @@
-"""What can be concealed in a network: drawn by family, with the words and sets an answer about it needs."""
+"""Effects to conceal in a network, drawn by family, with the words and sets that its answer needs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ def kind_of(effect: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Lie:
-    """What one channel reads wrongly: an effect's id and its size (and onset, s)."""
+    """Error of one channel: an effect's id and its size (and onset, s)."""
 
     effect: str
     channel: str
@@ -45,7 +45,7 @@ class Lie:
 
 @dataclass(frozen=True, slots=True)
 class Concealed:
-    """One concealed effect and what an answer says of it.
+    """One concealed effect and its answer.
 
     ``shape`` (n,) is what is on by step of the work, for effects with intervals; ``also`` are other effects
     at the same places that count as right; ``most`` of one effect that may share in it.
@@ -68,7 +68,7 @@ class Concealed:
 
 @dataclass(slots=True)
 class Scene:
-    """Where an effect is drawn: the machine, its random numbers, how strong."""
+    """Basis on which an effect is drawn: the machine, its random numbers, how strong."""
 
     owner: Owner
     rng: np.random.Generator
@@ -76,7 +76,7 @@ class Scene:
 
     @property
     def work(self):
-        """What acts on the machine."""
+        """Inputs of the machine."""
         return self.owner.machine.work
 
     @property

@@ -1,4 +1,4 @@
-"""Families of machines that are known as networks only: what they are made of and what they do.
+"""Families of machines known as networks only: their structure and their work.
 
 Each draws the true machine; :mod:`validation.networks.scene` writes down what an owner would estimate of it.
 """
@@ -46,7 +46,7 @@ def _length(rng: np.random.Generator, row: float, days: tuple[float, float]) -> 
 
 
 def _heated(network: Network, work: Work, rise: float) -> Network:
-    """The same network with gains so large that the hottest node rises by this much, K, nearly always."""
+    """The network with gains such that the hottest node's rise is this much, K, nearly always."""
     room_only = {name: np.zeros_like(v) for name, v in work.surroundings.items()}
     warm = march(network, replace(work, surroundings=room_only))
     factor = rise / max(np.quantile(warm, 0.97, axis=0).max(), 1e-9)

@@ -1,4 +1,4 @@
-"""What could be known of a network case: fits of the file's own linear network, with and without effects.
+"""Identifiability in a network case: fits of the file's own linear network, with and without effects.
 
 The machine as its file has it (no second masses, constant conductances, exponent 5/3, the room at one level
 where it is not recorded, inputs as logged) is fitted to noise-free readings, priors included, on a coarser
@@ -218,7 +218,7 @@ class Study:
 
 
 def _on_coarse_steps(study: Study, values: Array) -> Array:
-    """(n + 1,) what stands by step of the work, as means over the coarse steps of the diagnosed run."""
+    """Values by step of the work, as means over the coarse steps of the diagnosed run, (n + 1,)."""
     machine, run = study.owner.machine, study.runs[0]
     fine = values[machine.lead :]
     rows = fine[: fine.size // machine.row * machine.row].reshape(-1, machine.row).mean(axis=1)
@@ -251,7 +251,7 @@ def own_mimic(study: Study, effects: list[Concealed]) -> Mimic:
 
 
 def _heat_shapes(study: Study, concealed: Concealed | None) -> list[tuple[str, Array]]:
-    """What heat in intervals could look like: when it truly is on, or all through, or half of it."""
+    """Possible courses of heat in intervals: the true one, or all through, or half of it."""
     run = study.runs[0]
     if concealed is not None and concealed.shape is not None:
         return [("as it is", _on_coarse_steps(study, concealed.shape))]

@@ -1,4 +1,4 @@
-"""What an owner knows of a machine and records of it: estimates, sensors, a logger's habits."""
+"""An owner's knowledge and records of a machine: estimates, sensors, a logger's habits."""
 
 from dataclasses import dataclass, field
 
@@ -22,7 +22,7 @@ class Estimate:
     as_range: bool
 
     def text(self, unit: str) -> str:
-        """As a machine definition writes it."""
+        """Value in the form of a machine definition."""
         if self.as_range:
             low, high = (self.value * np.exp(k * SPREAD_90 * self.sigma) for k in (-1, 1))
             return f'{{low = "{low:.3g} {unit}", high = "{high:.3g} {unit}"}}'
@@ -87,7 +87,7 @@ class Run:
 
 
 def draw_owner(rng: np.random.Generator, machine: Machine, calibrated: bool) -> Owner:
-    """Draw what the file says, what it lacks and how the machine is recorded."""
+    """Draw the content of the file, what it lacks and how the machine is recorded."""
     network = machine.network
     plain: dict[str, float] = {f"capacity.{k}": v for k, v in network.capacity.items()}
     plain |= {f"conductance.{k}": v for k, v in network.conductance.items()}
@@ -141,7 +141,7 @@ def draw_owner(rng: np.random.Generator, machine: Machine, calibrated: bool) -> 
 
 
 def by_rows(values: Array, row: int, mean: bool) -> Array:
-    """(rows,) means of each row's steps, or what stood at its start."""
+    """Means of each row's steps, or values at its start, (rows,)."""
     whole = values[: values.size // row * row].reshape(-1, row)
     return whole.mean(axis=1) if mean else whole[:, 0].copy()
 
@@ -171,7 +171,7 @@ def run_machine(owner: Owner, later: bool, change: Change | None = None) -> Run:
 
 
 def held(values: Array) -> Array:
-    """Values with empty cells filled by what stood before."""
+    """Values with empty cells filled by the previous value."""
     at = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(values.size), 0))
     return values[at]
 

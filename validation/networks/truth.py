@@ -54,7 +54,7 @@ class Network:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What acts on a machine, on a uniform step, s: (n,) arrays by name; °C, W, rpm or percent."""
+    """Inputs of a machine, on a uniform step, s: (n,) arrays by name; °C, W, rpm or percent."""
 
     step: float
     inputs: dict[str, Array]
@@ -74,7 +74,7 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What differs from the plain network.
+    """Differences from the plain network.
 
     ``heat`` W by node; ``factor`` by link, constant or (n,); ``law`` by link: exponent and difference, K, at
     which the conductance is the plain one; ``rise`` by link: relative growth per K of mean temperature;

@@ -251,7 +251,7 @@ def _wetted_volume(spec: MachineSpec) -> float:
 
 
 def _viscosity(spec: MachineSpec) -> dict[str, tuple[float, float]]:
-    """Of the first set's lubricant: effects on friction know one oil a machine."""
+    """Viscosities of the first set's lubricant: effects on friction assume one oil per machine."""
     lubricants = [spec.lubricant_of(group) for group in spec.bearing_set] or [spec.grease]
     if lubricants[0] is None:
         return {}

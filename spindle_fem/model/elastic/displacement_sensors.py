@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class SensorSight:
-    """Where a sensor looks, seen from the flange.
+    """Target of a sensor on the shaft, seen from the flange.
 
     Attributes
     ----------

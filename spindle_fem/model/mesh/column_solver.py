@@ -20,7 +20,7 @@ COLUMNS_AT_ONCE = 24
 Array = NDArray[np.floating]
 # Product of a matrix with columns, written to the second argument.
 Product = Callable[[Array, Array], object]
-# The same of those columns that are still iterated, whose numbers follow.
+# Product for the columns that are still iterated, whose numbers are the third argument.
 ActiveProduct = Callable[[Array, Array, NDArray[np.int64]], object]
 
 

@@ -89,12 +89,12 @@ SHIFTS = (0.0, 3.0e-4, 3.0e-3)
 FAST_SHIFT = 3.0e-2
 # Heat of one place that a diagnosis may find a source in, W.
 PLACE_HEAT = 50.0
-# Of a solution that a basis is made from, as a share of the largest that occurs, in the energy norm: what a
-# projection makes of it at a probe is of second order in it.
+# Error of a solution from which a basis is made, as a share of the largest solution, in the energy norm; the
+# resulting error of a projection at a probe is of second order in it.
 SOLUTION_ERROR = 1.0e-3
-# To this share an error is itself worked out.
+# Relative tolerance of an error estimate.
 CHECK_TOLERANCE = 0.02
-# The same where another machine's basis is tried, which rarely comes near what is allowed.
+# Relative tolerance when another machine's basis is tried, whose error is rarely close to the limit.
 CHECK_OF_NEAR = 0.1
 # Rounds of checks in which such a basis grows; then it gets snapshots as any.
 ROUNDS_OF_NEAR = 2

@@ -262,7 +262,7 @@ def classes_of(
 
 
 def with_walls(drive: Drive, walls: Array) -> Drive:
-    """The same drive, its classes divided by the temperature of the channel's wall.
+    """The drive with its classes divided by the temperature of the channel's wall.
 
     Parameters
     ----------

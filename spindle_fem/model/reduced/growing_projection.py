@@ -1,4 +1,4 @@
-"""Galerkin projection of a mesh model that grows where its own residual asks.
+"""Galerkin projection of a mesh model whose basis is enlarged where its own residual is large.
 
 At a set of coefficients and some Laplace frequencies the projected solutions leave residuals ``r``; with
 the preconditioner B, ``√(rᵀ B r)`` estimates how far the full solutions are away in the energy norm. Only
@@ -35,7 +35,7 @@ DISTINCT_SHARE = 0.1
 LEAST_REDUCTION = 0.5
 # Rows that scalar products in double precision take at a time.
 ROWS_AT_ONCE = 16_384
-# Of what is new in a block, the share of the largest square that round-off may have made.
+# Share of the largest square below which the new part of a block may be round-off.
 DEPENDENT_SHARE = 1.0e-9
 FIRST_ROOM = 256
 # A preconditioner is made for this share of the highest frequency, which is at least this [1/s]: slow
@@ -168,7 +168,7 @@ class GrowingProjection:
         values, vectors = eigh(0.5 * (new + new.T))
         chosen = values > max(smallest**2, DEPENDENT_SHARE * float(values.max(initial=0.0)))
         turn = vectors[:, chosen] / np.sqrt(values[chosen])
-        # What is new of each, orthonormal among themselves and to those before.
+        # New part of each, orthonormal among themselves and to those before.
         self._join(block @ turn.astype(PRECISION) - self.fields(held @ turn))
         coordinates = np.zeros((self.size, block.shape[1]))
         coordinates[: len(held)], coordinates[len(held) :] = held, turn.T @ new
@@ -254,7 +254,7 @@ class GrowingProjection:
     def missing(
         self, sample: Sample, loads: Array, shifts: Sequence[float], basis: Array, share: float
     ) -> list[NDArray[np.float32]]:
-        """What solutions in a basis (d, r) of the directions miss, to a share of it; (n, m) each [K]."""
+        """Errors of solutions in a basis (d, r) of the directions, to a relative tolerance; each (n, m) K."""
         system = self._system(sample, shifts)
         _, residuals = self._projected(system, loads, shifts, basis)
         missing = []
@@ -350,7 +350,7 @@ class GrowingProjection:
 
 
 def in_solving_order(full: MeshModel) -> MeshModel:
-    """The same model with unknowns numbered for fast products.
+    """The model with unknowns renumbered for fast products.
 
     Neighbours near each other, each material's together, lumped nodes last.
     """

@@ -16,7 +16,7 @@ from spindle_fem.cache import cache_directory, load_record, save_record, source_
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.model.thermal_model import FORMAT
 
-# What of a material is a live coefficient.
+# Properties of a material that are live coefficients.
 MATERIAL_COEFFICIENTS = ("thermal_conductivity", "density", "specific_heat_capacity")
 BASIS_FORMAT = "spindle-fem/reduced-basis/1"
 
@@ -42,7 +42,7 @@ class KeptBasis:
 
     @classmethod
     def beside(cls, path: Path) -> KeptBasis | None:
-        """What is kept beside a reduced model; None where nothing is."""
+        """Basis stored beside a reduced model; None if there is none."""
         found = load_record(_basis_path(path), BASIS_FORMAT, cls)
         return None if found is None else cls(**found)
 
@@ -81,7 +81,7 @@ def _content(spec: MachineSpec) -> dict[str, Any]:
 
 
 def _without_marks(content: Any) -> Any:
-    """The same without where each value is from: ``--set`` marks what it sets, which changes nothing."""
+    """Content without the origin of values: ``--set`` marks what it sets, which does not change results."""
     if isinstance(content, dict):
         return {key: _without_marks(item) for key, item in content.items() if key != "marks"}
     if isinstance(content, (list, tuple)):

@@ -1,4 +1,4 @@
-"""What a stream past walls answers, whatever it flows through."""
+"""Interface of streams past walls, whatever they flow through."""
 
 from __future__ import annotations
 

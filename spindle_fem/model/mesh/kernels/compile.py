@@ -28,7 +28,7 @@ def compile_kernels() -> None:
 
 
 def compile_column_kernels() -> None:
-    """The same of those for several right-hand sides, which fast models are made with."""
+    """Compile kernels for several right-hand sides, with which fast models are made."""
     system = assemble_system(_small_problem()).tied()
     preconditioner = build_preconditioner(system, "multigrid")
     matrix = sparse.csr_array(system.full_matrix())

@@ -51,7 +51,7 @@ def film(stream: BearingStream) -> StreamAnswer:
         prandtl=DENSITY * HEAT_CAPACITY * VISCOSITY / CONDUCTIVITY,
         velocity=velocity,
         regime="turbulent",
-        # Of one row as two sudden changes of section: what nozzles and lines take is not known.
+        # One row as two sudden changes of section; the drop in nozzles and lines is not known.
         pressure_drop=1.5 * 0.5 * DENSITY * through**2,
         source="Bossmanns & Tu 1999",
         faults=film_of_air.faults(velocity=np.float64(velocity)),
