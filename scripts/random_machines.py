@@ -137,7 +137,7 @@ def _rear_set(
 
 def _operation(generator: np.random.Generator, code: int) -> dict[str, str]:
     pitch = 1.25 * 5.0 * code
-    speed = 10.0 ** generator.uniform(5.0, 6.15) / pitch
+    speed = 10.0 ** generator.uniform(4.5, 5.7) / pitch
     thrust = float(generator.choice([0.0, generator.uniform(-500.0, 1500.0)]))
     return {"speed": f"{speed:.0f} rpm", "thrust": f"{thrust:.0f} N", "ambient_temperature": "22 degC"}
 

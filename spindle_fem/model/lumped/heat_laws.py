@@ -313,14 +313,15 @@ class FrictionLaw:
     def heat(self, temperature: Array) -> tuple[Array, Array]:
         """Heat [W] of each bearing and its slope to ``weights @ T`` [W/K]."""
         base = self.weights @ temperature
-        # iterates may stray beyond the table, where the heat goes straight on; results may not
+        # Iterates may stray beyond the table, results may not. There the heat stays: going straight on it would
+        # fall below nothing in cold grease that rubs more as it warms, and balance below the room.
         at = np.minimum(np.maximum(base, self.breaks[:, 0]), self.breaks[:, -1])
         piece = (at[:, None] >= self.breaks[:, 1:-1]).sum(axis=1)
         bearing = np.arange(len(at))
         x = at - self.breaks[bearing, piece]
         c3, c2, c1, c0 = self.coefficients[:, piece, bearing]
-        slope = (3.0 * c3 * x + 2.0 * c2) * x + c1
-        return ((c3 * x + c2) * x + c1) * x + c0 + slope * (base - at), slope
+        slope = np.where(at == base, (3.0 * c3 * x + 2.0 * c2) * x + c1, 0.0)
+        return ((c3 * x + c2) * x + c1) * x + c0, slope
 
     def film_temperature(self, temperature: Array) -> Array:
         """Film temperature of each bearing, K."""
