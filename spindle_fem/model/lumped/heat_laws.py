@@ -313,8 +313,8 @@ class FrictionLaw:
     def heat(self, temperature: Array) -> tuple[Array, Array]:
         """Heat [W] of each bearing and its slope to ``weights @ T`` [W/K]."""
         base = self.weights @ temperature
-        # Iterates may stray beyond the table, results may not. There the heat stays: going straight on it would
-        # fall below nothing in cold grease that rubs more as it warms, and balance below the room.
+        # Iterates may stray beyond the table, results may not. There the heat stays: going straight on, it
+        # would fall below nothing in cold grease that rubs more as it warms, and balance below the room.
         at = np.minimum(np.maximum(base, self.breaks[:, 0]), self.breaks[:, -1])
         piece = (at[:, None] >= self.breaks[:, 1:-1]).sum(axis=1)
         bearing = np.arange(len(at))
