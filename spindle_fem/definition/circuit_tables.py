@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -19,6 +20,7 @@ from spindle_fem.definition.field_types import (
     Fault,
     Name,
     PositiveLength,
+    PositiveNumber,
     Range,
     Temperature,
     UncertainNumber,
@@ -35,10 +37,13 @@ DuctLaw = choice_field("spindle_fem.physics.coolant.duct_films")
 
 
 class CircuitFilm(StreamFilm):
-    """A separate coolant that flows along a straight duct and warms on its way.
+    """A separate coolant that flows along a duct and warms on its way.
 
-    The walls need no ``[[surface]]``: cells along the flow name them ``NAME.1``, ``NAME.2`` and so on from
-    the inlet (``NAME.inner.1``, ``NAME.outer.1`` of an annulus). Properties are those of the inlet.
+    Bores and annuli are drawn as they are. Grooves around a sleeve and rows of bores are not: a plain
+    cylinder of the part, beside a void, stands for them and gives their heat. The walls need no
+    ``[[surface]]``: cells along the flow name them ``NAME.1``, ``NAME.2`` and so on from the inlet
+    (``NAME.inner.1``, ``NAME.outer.1`` of an annulus). Cells of ring grooves and of bores with several passes
+    are side by side, each with its share of the flow. Properties are those of the inlet.
     """
 
     kind: Literal["circuit"]
@@ -48,15 +53,30 @@ class CircuitFilm(StreamFilm):
     duct: DuctKind = "bore"
     """Shape of the duct."""
     part: Name
-    """The part whose wall it wets: around a bore, inside an annulus."""
+    """The part whose wall it wets: around a bore, inside an annulus, with the grooves or bores in it."""
     outer_part: Name | None = None
     """The part around an annulus; ``part`` itself where none is given."""
     diameter: PositiveLength
-    """Diameter of the bore, or of the inner wall of an annulus, as drawn."""
+    """Diameter of the wall as drawn: of the bore, inside an annulus, of the floor of grooves, or of what
+    stands for a row of axial bores."""
     outer_diameter: PositiveLength | None = None
     """Diameter of the outer wall of an annulus, at most twice the inner."""
     z: Range
     """Start and end of the wetted walls."""
+    wall: Literal["inside", "outside"] | None = None
+    """Side of the part that has grooves, or stands for axial bores; outside for grooves, inside for bores."""
+    width: PositiveLength | None = None
+    """Axial width of a groove."""
+    depth: PositiveLength | None = None
+    """Radial depth of a groove."""
+    number: Annotated[int, Field(ge=1, le=200, strict=True)] = 1
+    """Ring grooves, starts of a helical groove, or axial bores."""
+    turns: PositiveNumber | None = None
+    """Of each start of a helical groove; they need not be whole."""
+    bore_diameter: PositiveLength | None = None
+    """Diameter of an axial bore."""
+    passes: Annotated[int, Field(ge=1, le=200, strict=True)] = 1
+    """Axial bores one after another that the coolant flows through, with turns between."""
     flows_to: Literal["front", "rear"] = "rear"
     """Towards the nose or away from it."""
     cells: Annotated[int, Field(ge=2, le=40, strict=True)] = 8
@@ -76,19 +96,37 @@ class CircuitFilm(StreamFilm):
     def _check(self) -> CircuitFilm:
         faults = []
         annulus = self.duct == "annulus"
-        if annulus and self.outer_diameter is None:
-            faults.append(Fault("outer_diameter", "is missing.", 'duct = "annulus" needs it.'))
         if annulus and self.outer_diameter is not None:
             low, high = self.diameter, 2.0 * self.diameter
             if not low < self.outer_diameter <= high + 1e-9:
                 what = f"{self.outer_diameter * 1e3:g} mm is no narrow annulus."
                 fix = f"Allowed: above {low * 1e3:g} up to {high * 1e3:g} mm."
                 faults.append(Fault("outer_diameter", what, fix))
-        for key in ("outer_diameter", "outer_part"):
-            if not annulus and getattr(self, key) is not None:
-                faults.append(Fault(key, "is given.", 'Only duct = "annulus" takes it.'))
-        raise_faults(faults)
+        raise_faults([*faults, *self._duct_faults()])
         return self
+
+    def _duct_faults(self) -> Iterator[Fault]:
+        """Measures that the duct lacks or does not take; of ducts of other packages nothing is known."""
+        needed, possible = _MEASURES.get(self.duct, ((), tuple(_ONLY_SOME)))
+        for key in needed:
+            if getattr(self, key) is None:
+                yield Fault(key, "is missing.", f'duct = "{self.duct}" needs it.')
+        for key in _ONLY_SOME:
+            if key not in (*needed, *possible) and getattr(self, key) not in (None, 1):
+                takers = [f'"{name}"' for name, keys in _MEASURES.items() if key in (*keys[0], *keys[1])]
+                yield Fault(key, "is given.", f"Only duct = {', '.join(takers)} takes it.")
+        grooves = self.number * (self.turns or 1.0) * (self.width or 0.0)
+        if self.duct in ("ring_grooves", "helical_groove") and grooves > self.length:
+            what = f"{1e3 * grooves:g} mm of grooves do not fit into {1e3 * self.length:g} mm of z."
+            yield Fault("width", what, "Give fewer or narrower grooves.")
+        if self.number % self.passes:
+            what = f"{self.number} bores are no multiple of {self.passes} passes."
+            yield Fault("passes", what, "Give passes that share the bores evenly.")
+
+    @property
+    def in_parallel(self) -> bool:
+        """Ring grooves, and bores there and back: what is beside a place did not all pass those before it."""
+        return self.duct == "ring_grooves" or self.passes > 1
 
     @property
     def length(self) -> float:
@@ -111,7 +149,9 @@ class CircuitFilm(StreamFilm):
         ends = list(pairwise(edges))
         if self.flows_to == "front":
             ends.reverse()
-        sides = [(self.part, "inward", self.diameter)]
+        grooved = self.duct in ("ring_grooves", "helical_groove")
+        wall = self.wall or ("outside" if grooved else "inside")
+        sides = [(self.part, "outward" if wall == "outside" else "inward", self.diameter)]
         if self.duct == "annulus":
             sides = [(self.part, "outward", self.diameter)]
             sides.append((self.outer_part or self.part, "inward", self.outer_diameter))
@@ -126,6 +166,48 @@ class CircuitFilm(StreamFilm):
         )
 
 
+class WettedFilm(StreamFilm):
+    """A liquid that runs down over surfaces in a film, as cutting fluid over a nose, and leaves mixed.
+
+    Its surfaces give it their heat together; how warm it gets follows from its flow.
+    """
+
+    kind: Literal["wetted"]
+    """Type of film."""
+    name: Name
+    """Name in results, factors and probes."""
+    surface_names: Annotated[tuple[Name, ...], Field(min_length=1, alias="surface")]
+    """Names of surfaces; each surface takes one film or gap."""
+    width: PositiveLength
+    """Across the flow; twice the length of a lying cylinder, which is wet on both sides."""
+    length: PositiveLength
+    """Down the flow; half the circumference of a lying cylinder."""
+    fluid: Fluid
+    """Liquid, for its properties."""
+    inlet_temperature: Temperature
+    """Temperature where it meets the surfaces."""
+    flow: VolumeFlow
+    """What runs over the surfaces; not what splashes off."""
+    factor: UncertainNumber = Uncertain(1.0)
+    """Factor on the coefficient: dry places, turning surfaces, jets."""
+
+    @property
+    def cell_surfaces(self) -> tuple[tuple[str, ...], ...]:
+        """All surfaces meet one mixed stream."""
+        return (self.surface_names,)
+
+
+# Measures that a duct needs, and may have beside.
+_MEASURES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "bore": ((), ()),
+    "annulus": (("outer_diameter",), ("outer_part",)),
+    "ring_grooves": (("width", "depth"), ("number", "wall")),
+    "helical_groove": (("width", "depth", "turns"), ("number", "wall")),
+    "axial_bores": (("bore_diameter",), ("number", "passes", "wall")),
+}
+_ONLY_SOME = tuple(dict.fromkeys(key for keys in _MEASURES.values() for key in (*keys[0], *keys[1])))
+
 Film = Annotated[
-    ConstantFilm | NaturalFilm | RotatingFilm | CircuitFilm | LubricationFilm, Field(discriminator="kind")
+    ConstantFilm | NaturalFilm | RotatingFilm | CircuitFilm | WettedFilm | LubricationFilm,
+    Field(discriminator="kind"),
 ]

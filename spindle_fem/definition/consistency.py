@@ -313,11 +313,13 @@ def _circuits(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError
                 continue
             if part not in declared.parts:
                 yield _unknown(f"film.{film.name}.{key}", part, "part", declared.parts)
-            elif film.duct == "annulus" and declared.rotating[part]:
+            elif (
+                film.duct == "annulus" and declared.rotating[part] and (film.law, key) != ("turning", "part")
+            ):
                 yield SpecError(
                     f"film.{film.name}.{key}",
                     f'"{part}" turns.',
-                    "The walls of an annulus stand; a turning one drags its coolant.",
+                    'The walls of an annulus stand, but the inner one with law = "turning".',
                 )
         for name in film.surface:
             if name in declared.names["surface"]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from spindle_fem.definition.exchange_tables import Surface
 from spindle_fem.definition.field_types import SpecModel
 
@@ -14,8 +12,10 @@ class StreamFilm(SpecModel):
     A stream has ``name``, ``inlet_temperature``, ``flow`` and ``factor``.
     """
 
-    in_parallel: ClassVar[bool] = False
-    """Whether every cell takes its own share of the flow from the inlet, or what the cell before left."""
+    @property
+    def in_parallel(self) -> bool:
+        """Whether every cell takes its own share of the flow from the inlet, or what the cell before left."""
+        return False
 
     @property
     def temperature(self) -> float:

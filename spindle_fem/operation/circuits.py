@@ -12,14 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.circuit_tables import CircuitFilm
+from spindle_fem.definition.circuit_tables import CircuitFilm, WettedFilm
 from spindle_fem.definition.lubrication_tables import LubricationFilm
 from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.operation.bearing_lubricants import bearing_stream
 from spindle_fem.physics.coolant.duct_films import DUCT_FILMS
 from spindle_fem.physics.coolant.duct_kinds import DUCT_KINDS
-from spindle_fem.physics.coolant.ducts import DuctFlow
-from spindle_fem.physics.coolant.linear_march import MarchMaps, march_maps
+from spindle_fem.physics.coolant.ducts import DuctFlow, DuctShape
+from spindle_fem.physics.coolant.falling_film import falling_film
+from spindle_fem.physics.coolant.linear_march import march_maps
 from spindle_fem.physics.coolant.lubrication_kinds import LUBRICATION_KINDS
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.physics.coolant.streams import StreamAnswer
@@ -32,11 +33,15 @@ def stream_answer(film: StreamFilm, speed: float) -> StreamAnswer:
     """Flow and film of a stream at a speed of the shaft [rad/s]."""
     if isinstance(film, LubricationFilm):
         return LUBRICATION_KINDS[film.lubrication.kind].film(bearing_stream(film, speed))
-    flow = duct_flow(film)
+    if isinstance(film, WettedFilm):
+        liquid = coolant_by_name(film.fluid)
+        return falling_film(liquid, film.flow, film.inlet_temperature, film.width, film.length)
+    flow = duct_flow(film, speed)
     answer = DUCT_FILMS[film.law](flow)
     conductivity = float(flow.properties.thermal_conductivity)
+    in_duct = answer.nusselt * conductivity / flow.section.hydraulic_diameter
     return StreamAnswer(
-        coefficient=answer.nusselt * conductivity / flow.section.hydraulic_diameter,
+        coefficient=in_duct * flow.section.wetted_ratio,
         capacity_rate=flow.capacity_rate,
         reynolds=flow.reynolds,
         prandtl=flow.prandtl,
@@ -61,10 +66,22 @@ def capacity_rate(film: StreamFilm) -> float:
     return stream_answer(film, 0.0).capacity_rate
 
 
-def duct_flow(film: CircuitFilm) -> DuctFlow:
-    """Flow through the duct of a circuit."""
-    section = DUCT_KINDS[film.duct](film.diameter, film.outer_diameter)
-    return DuctFlow(section, film.length, coolant_by_name(film.fluid), film.flow, film.inlet_temperature)
+def duct_flow(film: CircuitFilm, speed: float = 0.0) -> DuctFlow:
+    """Flow through the duct of a circuit at a speed of the shaft [rad/s]."""
+    shape = DuctShape(
+        diameter=film.diameter,
+        length=film.length,
+        outer_diameter=film.outer_diameter,
+        width=film.width,
+        depth=film.depth,
+        number=film.number,
+        passes=film.passes,
+        turns=film.turns,
+        bore_diameter=film.bore_diameter,
+    )
+    coolant = coolant_by_name(film.fluid)
+    section = DUCT_KINDS[film.duct](shape)
+    return DuctFlow(section, film.length, coolant, film.flow, film.inlet_temperature, speed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,14 +94,17 @@ class CircuitMarch:
         Cell of each wall.
     share : (n, k) ndarray, [-]
         Of each wall's temperature in the one that its cell has.
-    maps : MarchMaps
-        Over the cells.
+    bulk_from_wall : (n, n) ndarray, [-]
+        Mean coolant of each cell above the inlet, for each kelvin of each cell's wall above it.
+    outlet_from_wall : (n,) ndarray, [-]
+        Mixed outlet likewise.
     capacity_rate : float, [W/K]
     """
 
     cell: NDArray[np.int64]
     share: Array
-    maps: MarchMaps
+    bulk_from_wall: Array
+    outlet_from_wall: Array
     capacity_rate: float
 
     @classmethod
@@ -107,17 +127,22 @@ class CircuitMarch:
             there, conductance / np.where(there, total[cell], 1.0), 0.0
         )
         rate = capacity_rate(film)
-        return cls(cell, share, march_maps(rate, np.ones(film.n_cells), total), rate)
+        if film.in_parallel:
+            alone = march_maps(rate / film.n_cells, np.ones((film.n_cells, 1)), total[:, None])
+            bulk = np.diag(alone.bulk_from_wall[:, 0, 0])
+            return cls(cell, share, bulk, alone.outlet_from_wall[:, 0] / film.n_cells, rate)
+        maps = march_maps(rate, np.ones(film.n_cells), total)
+        return cls(cell, share, maps.bulk_from_wall, maps.outlet_from_wall, rate)
 
     @property
     def warming(self) -> Array:
         """Coolant at each wall above the inlet, for each kelvin of each wall above the inlet, (k, k)."""
-        return (self.maps.bulk_from_wall @ self.share)[self.cell]
+        return (self.bulk_from_wall @ self.share)[self.cell]
 
     @property
     def outlet(self) -> Array:
         """Outlet above the inlet, for each kelvin of each wall above the inlet, (k,)."""
-        return self.maps.outlet_from_wall @ self.share
+        return self.outlet_from_wall @ self.share
 
 
 def wall_cells(film: StreamFilm) -> NDArray[np.int64]:

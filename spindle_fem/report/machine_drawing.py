@@ -280,7 +280,7 @@ def _film_legend(spec: MachineSpec) -> list[tuple[str, str]]:
             text = f"{film.coefficient.value:g} W/(m²·K)"
         elif film.kind == "rotating":
             text = f"by speed, at least {film.minimum:g} W/(m²·K)"
-        elif film.kind == "circuit":
+        elif film.kind in ("circuit", "wetted"):
             text = f"{film.fluid.replace('_', ' ')}, {film.flow * 6.0e4:.3g} L/min"
         elif film.kind == "lubrication":
             text = f"{film.lubrication.kind.replace('_', ' ')}, {film.flow * 6.0e4:.3g} L/min"

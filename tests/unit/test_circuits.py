@@ -19,7 +19,7 @@ from spindle_fem.operation.circuits import (
 from spindle_fem.physics.coolant.coolants.water import Water
 from spindle_fem.physics.coolant.duct_films import DUCT_FILMS
 from spindle_fem.physics.coolant.duct_kinds import DUCT_KINDS
-from spindle_fem.physics.coolant.ducts import LAMINAR_TO, TURBULENT_FROM, DuctFlow
+from spindle_fem.physics.coolant.ducts import LAMINAR_TO, TURBULENT_FROM, DuctFlow, DuctShape
 
 WATER = Water()
 LITRE_PER_MINUTE = 1e-3 / 60.0
@@ -38,7 +38,7 @@ def said(film):
 
 
 def flow_of(litres, kind="bore", diameter=0.02, outer=None, length=0.4):
-    section = DUCT_KINDS[kind](diameter, outer)
+    section = DUCT_KINDS[kind](DuctShape(diameter, length, outer))
     return DuctFlow(section, length, WATER, litres * LITRE_PER_MINUTE, 293.15)
 
 
@@ -82,7 +82,7 @@ def test_film_and_pressure_do_not_jump_between_the_regimes():
 
 def test_a_wide_annulus_is_refused():
     with pytest.raises(OutOfValidityError, match="outer_diameter is 210 mm"):
-        DUCT_KINDS["annulus"](0.1, 0.21)
+        DUCT_KINDS["annulus"](DuctShape(0.1, 0.2, 0.21))
 
 
 def test_outside_its_source_the_film_says_so():

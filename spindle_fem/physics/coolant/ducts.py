@@ -7,11 +7,45 @@ from dataclasses import dataclass
 import numpy as np
 
 from spindle_fem.correlation import Array, correlation
+from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.properties import Coolant, CoolantProperties
 from spindle_fem.validity import POSITIVE, require_range
 
 # Reynolds numbers between which a straight duct turns turbulent (Gnielinski 2013).
 LAMINAR_TO, TURBULENT_FROM = 2300.0, 4000.0
+
+
+@dataclass(frozen=True, slots=True)
+class DuctShape:
+    """Measures of a duct as a definition gives them; a kind asks for those that it needs.
+
+    Attributes
+    ----------
+    diameter, outer_diameter : float, [m]
+        Of the walls that are drawn; the outer one of an annulus only.
+    length : float, [m]
+        Of the drawn wall along the axis.
+    width, depth : float or None, [m]
+        Of a groove.
+    number : int
+        Grooves or bores side by side, or starts of a helix.
+    passes : int
+        Bores one after another that the coolant flows through.
+    turns : float or None
+        Of a helix.
+    bore_diameter : float or None, [m]
+        Of an axial bore.
+    """
+
+    diameter: float
+    length: float
+    outer_diameter: float | None = None
+    width: float | None = None
+    depth: float | None = None
+    number: int = 1
+    passes: int = 1
+    turns: float | None = None
+    bore_diameter: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +60,30 @@ class DuctSection:
         Developed, walls of one temperature, on the hydraulic diameter.
     laminar_friction : float, [-]
         Darcy friction factor times Reynolds number.
+    paths : int
+        Ducts in parallel that share the flow evenly.
+    path_length : float or None, [m]
+        Of each; that of the drawn wall where None.
+    wetted_ratio : float, [-]
+        Wetted surface that the drawn walls stand for, over theirs.
+    turn_loss : float, [-]
+        Loss coefficients of the turns of a path, together.
+    helix : ChannelSection or None
+        The same duct wound on a cylinder.
+    turning_diameter : float or None, [m]
+        Of the inner wall of an annulus, which may turn.
     """
 
     area: float
     perimeter: float
     laminar_nusselt: float
     laminar_friction: float
+    paths: int = 1
+    path_length: float | None = None
+    wetted_ratio: float = 1.0
+    turn_loss: float = 0.0
+    helix: ChannelSection | None = None
+    turning_diameter: float | None = None
 
     @property
     def hydraulic_diameter(self) -> float:
@@ -46,7 +98,11 @@ class DuctFlow:
     Attributes
     ----------
     length : float, [m]
+        Of the drawn wall.
     volume_flow, inlet_temperature : float, [m³/s], [K]
+        Of all paths together; where it enters.
+    speed : float, [rad/s]
+        Of a wall that turns.
 
     Raises
     ------
@@ -59,6 +115,7 @@ class DuctFlow:
     coolant: Coolant
     volume_flow: float
     inlet_temperature: float
+    speed: float = 0.0
 
     def __post_init__(self) -> None:
         require_range(
@@ -76,7 +133,7 @@ class DuctFlow:
     @property
     def velocity(self) -> float:
         """Mean over the section, [m/s]."""
-        return self.volume_flow / self.section.area
+        return self.volume_flow / self.section.paths / self.section.area
 
     @property
     def reynolds(self) -> float:
@@ -91,7 +148,7 @@ class DuctFlow:
     @property
     def slenderness(self) -> float:
         """Length over hydraulic diameter, [-]."""
-        return self.length / self.section.hydraulic_diameter
+        return (self.section.path_length or self.length) / self.section.hydraulic_diameter
 
     @property
     def turbulent_share(self) -> float:
@@ -111,11 +168,12 @@ class DuctFlow:
 
     @property
     def pressure_drop(self) -> float:
-        """Friction along the duct without what is before and after it, [Pa]."""
+        """Friction along the duct and its turns without what is before and after it, [Pa]."""
         laminar = self.section.laminar_friction / min(self.reynolds, LAMINAR_TO)
         smooth = float(friction_factor_smooth(max(self.reynolds, TURBULENT_FROM), extrapolate=True))
         factor = laminar + self.turbulent_share * (smooth - laminar)
-        return factor * self.slenderness * 0.5 * float(self.properties.density) * self.velocity**2
+        head = 0.5 * float(self.properties.density) * self.velocity**2
+        return (factor * self.slenderness + self.section.turn_loss) * head
 
 
 @dataclass(frozen=True, slots=True)

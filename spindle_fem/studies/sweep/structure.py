@@ -36,7 +36,7 @@ def structure_digest(dump: Mapping[str, Any]) -> str:
     for table, keys in _FREE_OF_LISTS.items():
         if table in kept:
             kept[table] = [
-                _without(item, _FREE_OF_CIRCUITS if item.get("kind") == "circuit" else keys)
+                _without(item, _FREE_OF_CIRCUITS if item.get("kind") in ("circuit", "wetted") else keys)
                 for item in kept[table]
             ]
     materials = kept.get("materials", {})
