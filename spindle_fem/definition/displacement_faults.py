@@ -20,7 +20,7 @@ def displacement_faults(spec: MachineSpec) -> Iterator[SpindleFemError]:
         first = spec.displacement_sensor[0].name
         what = "no bearing holds the shaft."
         yield SpecError(f"displacement_sensor.{first}", what, "Add a [[bearing_set]].")
-    if spec.heat is not None and spec.heat.thermal_preload:
+    if spec.heat is not None and spec.follows_preload:
         reads = reads or "heat.thermal_preload follows how parts grow"
     for name in dict.fromkeys(part.material for part in spec.part) if reads else ():
         material = spec.materials.get(name)

@@ -155,8 +155,10 @@ class Heat(SpecModel):
     """Palmgren's lubrication factor: about 2 for grease, up to 4 with a fresh fill."""
     skf_mu_ehl: PositiveNumber = 0.04
     """Sliding friction coefficient in full film: 0.04 synthetic, 0.05 mineral oil."""
-    thermal_preload: Flag = False
-    """Whether ring, ball, shaft and housing expansion changes the preload and with it the heat."""
+    thermal_preload: Flag | None = None
+    """Whether ring, ball, shaft and housing expansion changes the preload and with it the heat. Where none
+    is given, it does wherever all preloaded sets have a `fit`; models that cannot follow it then take
+    bearings of the size of assembly and say so."""
     table: HeatTable | None = None
     """Needed with `model = "table"`."""
 
@@ -358,6 +360,16 @@ class MachineSpec(SpecModel):
     def bearings(self) -> tuple[tuple[BearingSet, SetBearing], ...]:
         """Every bearing with its set, in file order."""
         return tuple((group, bearing) for group in self.bearing_set for bearing in group.bearing)
+
+    @property
+    def follows_preload(self) -> bool:
+        """Whether expansion changes the preload of its bearings, and with it their heat."""
+        if not self.bearing_set or self.heat.model == "table":
+            return False
+        if self.heat.thermal_preload is not None:
+            return self.heat.thermal_preload
+        preloaded = [group for group in self.bearing_set if group.preload > 0.0]
+        return bool(preloaded) and all(group.fit is not None for group in preloaded)
 
     @property
     def rolling_elements(self) -> str:

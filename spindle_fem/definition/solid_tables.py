@@ -37,6 +37,8 @@ from spindle_fem.units import Uncertain
 PoissonRatio = quantity_field("", at_least=0.0, at_most=0.5)
 PathFill = quantity_field("", at_least=0.0, at_most=0.3)
 FilmStarvation = quantity_field("", at_least=0.1, at_most=1.0)
+ShearRatio = quantity_field("", at_least=0.005, at_most=0.2)
+ShearSlope = quantity_field("1/K", at_least=0.0, at_most=0.02)
 ThermalExpansion = quantity_field("1/K", at_least=0.0, at_most=1.0e-4)
 FitDiameter = quantity_field("m", at_least=-1.0e-3, at_most=1.0e-3)
 
@@ -68,7 +70,7 @@ class Material(SpecModel):
     poisson_ratio: PoissonRatio = 0.3
     """Used like `young_modulus`; 0.26 for silicon nitride."""
     thermal_expansion: ThermalExpansion = 12.5e-6
-    """Linear, for rings, balls, shaft and housing with `heat.thermal_preload`."""
+    """Linear, for rings, balls, shaft and housing; growth and `heat.thermal_preload` follow it."""
 
     @property
     def volumetric_heat_capacity(self) -> float:
@@ -257,6 +259,11 @@ class Grease(SpecModel):
     """The grease is checked against it."""
     film_starvation: FilmStarvation = 1.0
     """Film over the fully flooded one; 0.5 to 0.7 in aged grease."""
+    limiting_shear_ratio: ShearRatio = 0.07
+    """Limiting shear stress of the film over its pressure, at 40 °C: 0.03 to 0.05 of synthetic oils, up to
+    0.1 of naphthenic ones. It says how friction grows with a preload of several times that of assembly."""
+    limiting_shear_slope: ShearSlope = 0.0
+    """Relative fall of that ratio with temperature, about 0.5 % a kelvin."""
 
     @model_validator(mode="after")
     def _check(self) -> Grease:

@@ -25,6 +25,7 @@ from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for
+from spindle_fem.operation.bearing_heat import without_unasked_preload
 from spindle_fem.operation.preload_mechanics import machine_view
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.channel_checks import Flag
@@ -98,7 +99,7 @@ def open_machine(
         raise RecordingError("recordings", "there are none.", "Give at least one to be diagnosed.")
     if network_spec.is_network_machine(read_definition(find_machine(machine))):
         return _open_network(machine, overrides, recordings, calibration, heldout)
-    spec = load_machine(machine, overrides)
+    spec, left_out = without_unasked_preload(load_machine(machine, overrides))
     recordings, notes = _denoised(recordings)
     calibration, more = _denoised(calibration)
     fast = fast_model_for(spec, (*recordings, *calibration), progress=progress)
@@ -113,7 +114,7 @@ def open_machine(
         view,
         tuple(recordings),
         tuple(calibration),
-        (*notes, *more),
+        (*left_out, *notes, *more),
     )
 
 

@@ -112,19 +112,28 @@ def heat_model_of(spec: MachineSpec) -> HeatModel:
     return by_table
 
 
-def follows_preload(spec: MachineSpec) -> bool:
-    """Whether expansion changes the preload of a machine's bearings, and with it their heat."""
-    return bool(spec.bearing_set) and spec.heat.thermal_preload and spec.heat.model != "table"
-
-
 def grows(spec: MachineSpec) -> bool:
     """Whether elastic bodies carry rings whose fits change with temperature."""
-    return follows_preload(spec) and any(group.fit for group in spec.bearing_set)
+    return spec.follows_preload and any(group.fit for group in spec.bearing_set)
 
 
 def at_assembly_size(spec: MachineSpec) -> MachineSpec:
     """The machine with bearings that keep their size at assembly."""
     return spec.model_copy(update={"heat": spec.heat.model_copy(update={"thermal_preload": False})})
+
+
+def without_unasked_preload(spec: MachineSpec) -> tuple[MachineSpec, tuple[str, ...]]:
+    """The machine for models that cannot follow its preload, and in words what that leaves out.
+
+    Where the definition does not ask for it (``heat.thermal_preload``), bearings keep the size of assembly.
+    """
+    if not spec.follows_preload or spec.heat.thermal_preload is not None:
+        return spec, ()
+    note = (
+        "thermal preload is left out: in the fast model bearings keep the size of assembly "
+        "(spindle-fem run and transient follow it)"
+    )
+    return at_assembly_size(spec), (note,)
 
 
 def table_heat(spec: MachineSpec, point: OperatingPoint) -> tuple[dict[str, float], tuple[CodedWarning, ...]]:
@@ -395,11 +404,11 @@ class BearingMechanics:
         self, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
     ) -> tuple[dict[str, BearingHeat], tuple[CodedWarning, ...]]:
         """Heat, contacts and films of every bearing; the heat model's interface."""
-        states = self.states(point, temperatures, expand=self.spec.heat.thermal_preload)
+        states = self.states(point, temperatures, expand=self.spec.follows_preload)
         factors = {bearing.name: group.heat_factor.value for group, bearing in self.spec.bearings}
         groups = {bearing.name: group for group, bearing in self.spec.bearings}
         heat, warnings = {}, []
-        seats = self._seats(point, temperatures, states) if self.spec.heat.thermal_preload else {}
+        seats = self._seats(point, temperatures, states) if self.spec.follows_preload else {}
         for name, state in states.items():
             path = self._ball_path(groups[name], state)
             terms = {term: factors[name] * value for term, value in state.heat.terms.items()}

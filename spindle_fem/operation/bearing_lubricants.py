@@ -106,6 +106,8 @@ def _of_grease(grease: Grease) -> Lubricant:
         kinematic_viscosity_100=grease.kinematic_viscosity_100,
         density=grease.base_oil_density,
         pressure_viscosity=grease.pressure_viscosity,
+        limiting_shear_ratio=grease.limiting_shear_ratio,
+        limiting_shear_slope=grease.limiting_shear_slope,
         thermal_conductivity=grease.thermal_conductivity,
         film_starvation=grease.film_starvation,
         path_fill=grease.path_fill,

@@ -24,8 +24,8 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
-# Shares of the highest speed; friction moments bend most where films are thin.
-SPEED_SHARES = (0.02, 0.04, 0.08, 0.14, 0.22, 0.32, 0.44, 0.58, 0.72, 0.86, 1.0)
+# Shares of the highest speed; friction moments and what contacts conduct bend most where films are thin.
+SPEED_SHARES = (0.001, 0.004, 0.01, 0.02, 0.04, 0.08, 0.14, 0.22, 0.32, 0.44, 0.58, 0.72, 0.86, 1.0)
 FILM_TEMPERATURES = (ZERO_CELSIUS_K + 5.0, ZERO_CELSIUS_K + 95.0)
 # Eight leave 7e-4 of the heat, twelve 5e-5.
 TEMPERATURE_POINTS = 12
@@ -209,7 +209,7 @@ def thrusts_between(spec: MachineSpec, low: float, high: float) -> tuple[float, 
 
 
 def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence[float]) -> FrictionMap:
-    """Solve a machine's bearings over speed, thrust and film temperature.
+    """Solve a machine's bearings, at the size of assembly, over speed, thrust and film temperature.
 
     Parameters
     ----------
@@ -223,12 +223,12 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
     Raises
     ------
     SpecError
-        Nothing to tabulate, or heat that follows expansion.
+        Nothing to tabulate, or heat that was asked to follow expansion.
     NoEquilibriumError, OutOfValidityError
     """
     if not needs_map(spec):
         raise SpecError("heat.model", "the heat is given by table already.", "Use the machine as it is.")
-    if spec.heat.thermal_preload and spec.heat.model != "table":
+    if spec.follows_preload and spec.heat.thermal_preload:
         raise SpecError(
             "heat.thermal_preload",
             "with it heat follows every ring, and no table over one film temperature holds.",

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
     from spindle_fem.model.elastic.deformed_shape import BodyShape
     from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
+    from spindle_fem.operation.bearing_heat import BearingTemperatures
     from spindle_fem.validity import CodedWarning
 
 
@@ -189,6 +190,8 @@ class ThermalResult(Presented):
     timings : mapping of str to float, [s]
     extra : mapping
         More entries of the summary.
+    bearing_temperatures : mapping of bearing to BearingTemperatures
+        What its friction follows.
     heat_study : mapping or None
         Heat over speed at this run's temperatures, if requested.
     growth_model : GrowthModel or None
@@ -222,6 +225,7 @@ class ThermalResult(Presented):
     timings: Mapping[str, float]
     circuits: Mapping[str, CircuitResult] = field(default_factory=dict)
     extra: Mapping[str, Any] = field(default_factory=dict)
+    bearing_temperatures: Mapping[str, BearingTemperatures] = field(default_factory=dict)
     heat_study: Mapping[str, Any] | None = None
     growth_model: GrowthModel | None = None
     equilibrium: Equilibrium | None = None

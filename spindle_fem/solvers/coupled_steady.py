@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from spindle_fem.errors import ConvergenceError, NoSteadyStateError, SpindleFemError
 from spindle_fem.model.mesh.linear_solvers import RELATIVE_TOLERANCE
 from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady
-from spindle_fem.operation.bearing_heat import follows_preload
 from spindle_fem.operation.circuits import capacity_rate
 from spindle_fem.operation.coolant_loop import CoolantState
 from spindle_fem.operation.loads import NO_CHANGE, LoadChange, Loads
@@ -102,7 +101,7 @@ def solve_coupled(
     try:
         return _settle(machine, point, start, beyond)
     except NoSteadyStateError as error:
-        if not follows_preload(machine.spec):
+        if not machine.spec.follows_preload:
             raise
         raise _beyond_the_fold(machine, point, error, beyond) from error
 
@@ -116,7 +115,7 @@ def _settle(
 ) -> CoupledState:
     """The fixed point, or with ``enough`` a field that its own loads move by less than that, K."""
     first = None
-    if follows_preload(machine.spec) and start is None:
+    if machine.spec.follows_preload and start is None:
         # Cold grease makes heat that would carry the loop past the fixed point.
         first = _settle(without_expansion(machine), point, None, beyond, enough=FIRST_STATE)
         if beyond is None:
@@ -163,7 +162,7 @@ class _Operation:
         self, machine: PreparedMachine, point: OperatingPoint, beyond: Beyond | None, enough: float = 0.0
     ) -> None:
         self.machine, self.point, self.beyond, self.enough = machine, point, beyond, enough
-        self.follows_preload = follows_preload(machine.spec)
+        self.follows_preload = machine.spec.follows_preload
         self.names = machine.builder.lumped_names
         # Before a first solve nothing is known of the lumped nodes.
         self.lumped_known = False

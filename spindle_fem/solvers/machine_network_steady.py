@@ -19,7 +19,6 @@ from spindle_fem.operation.bearing_heat import (
     BearingTemperatures,
     HeatModel,
     at_assembly_size,
-    follows_preload,
     heat_model_of,
 )
 from spindle_fem.operation.loads import BearingHeat
@@ -144,7 +143,7 @@ def solve_machine_network(
     point, and creeps up while the preload grows.
     """
     point = OperatingPoint.of(machine.spec) if point is None else point
-    if not follows_preload(machine.spec):
+    if not machine.spec.follows_preload:
         return _Operation(machine, point, heat_model or network_heat_model(machine)).solve()
     heat_model = heat_model or network_heat_model(machine)
     try:

@@ -10,7 +10,9 @@ import numpy as np
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import NoEquilibriumError, SpecError
-from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
+from spindle_fem.model.elastic.machine_bodies import machine_bodies
+from spindle_fem.model.elastic.ring_seats import RingSeats
+from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures, grows
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.heat_model import friction_model_names
@@ -47,6 +49,9 @@ def heat_study(
         Of a solved machine, kept for every speed; the isothermal films keep
         ``temperature``.
 
+    Bearings grow with temperatures that were solved for, where the machine follows its preload; at one for
+    all they keep the size of assembly.
+
     Returns
     -------
     dict
@@ -65,7 +70,10 @@ def heat_study(
         raise SpecError(f"{spec.name}: grease", "is missing.", "Films and friction need it, or lubrication.")
     chosen = tuple(speeds) or usual_speeds(spec)
     point = OperatingPoint.of(spec)
-    mechanics = BearingMechanics(spec)
+    expand = spec.follows_preload and (coupled or temperatures is not None)
+    seats = RingSeats(spec, machine_bodies(spec)).of_sets(spec) if expand and grows(spec) else None
+    mechanics = BearingMechanics(spec, seats)
+    factors = {bearing.name: group.heat_factor.value for group, bearing in spec.bearings}
     names = [bearing.name for _, bearing in spec.bearings]
     uniform = {name: BearingTemperatures(*(temperature,) * 5) for name in names}
     by_speed = _solved_temperatures(spec, chosen) if coupled else {}
@@ -76,15 +84,16 @@ def heat_study(
         at_speed = replace(point, speed=speed)
         here = by_speed.get(speed, temperatures or uniform)
         try:
-            states = mechanics.states(at_speed, here, expand=spec.heat.thermal_preload)
+            states = mechanics.states(at_speed, here, expand=expand)
             isothermal = mechanics.states(at_speed, uniform, expand=False)
         except NoEquilibriumError as error:
             warnings.append(CodedWarning("no_equilibrium", f"{speed / RPM:.0f} rpm: {error}"))
             continue
         for name in names:
-            rows[name].append(_row(states[name], speed, here[name], isothermal[name]))
-            warnings += states[name].warnings
-        models.append(_by_model(mechanics, at_speed, here))
+            state = _scaled(states[name], factors[name])
+            rows[name].append(_row(state, speed, here[name], isothermal[name]))
+            warnings += state.warnings
+        models.append(_by_model(mechanics, at_speed, here, expand))
     return {
         "schema": HEAT_SCHEMA,
         "machine": spec.name,
@@ -132,6 +141,14 @@ def _solved_temperatures(
     return found
 
 
+def _scaled(state: BearingState, factor: float) -> BearingState:
+    """A state with a factor on its friction."""
+    terms = {term: factor * value for term, value in state.heat.terms.items()}
+    return replace(
+        state, heat=replace(state.heat, terms=terms), friction_moment=factor * state.friction_moment
+    )
+
+
 def _row(
     state: BearingState, speed: float, temperatures: BearingTemperatures, isothermal: BearingState
 ) -> dict[str, Any]:
@@ -177,15 +194,19 @@ def _row(
 
 
 def _by_model(
-    mechanics: BearingMechanics, point: OperatingPoint, temperatures: Mapping[str, BearingTemperatures]
+    mechanics: BearingMechanics,
+    point: OperatingPoint,
+    temperatures: Mapping[str, BearingTemperatures],
+    expand: bool,
 ) -> dict[str, Any]:
-    """Heat of every bearing by every model, side by side."""
+    """Heat of every bearing by every model, side by side, with the factor of the machine on it."""
+    factors = {bearing.name: group.heat_factor.value for group, bearing in mechanics.spec.bearings}
     heat: dict[str, dict[str, float]] = {}
     rollers = any(isinstance(mounted, RollerSet) for mounted in mechanics.sets.values())
     for level in friction_model_names(rollers=rollers):
         options = replace(mechanics.options, level=level)
-        states = mechanics.states(point, temperatures, expand=False, options=options)
-        heat[level] = {name: state.heat.total for name, state in states.items()}
+        states = mechanics.states(point, temperatures, expand=expand, options=options)
+        heat[level] = {name: factors[name] * state.heat.total for name, state in states.items()}
     return {"speed_rpm": point.speed / RPM, "heat_W": heat}
 
 

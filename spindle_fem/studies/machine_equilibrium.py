@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from spindle_fem.definition.machine_spec import Lubrication, MachineSpec
-from spindle_fem.operation.bearing_heat import follows_preload
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.results.thermal_result import BearingResult, Equilibrium
 from spindle_fem.solvers.coupled_steady import CoupledState
@@ -39,7 +38,7 @@ def equilibrium_of(
         return None
     fold = searched = None
     limits = _limits(spec, coupled, bearings)
-    if search and follows_preload(spec) and point.speed > 0.0:
+    if search and spec.follows_preload and point.speed > 0.0:
         branch = equilibria_above(
             machine, point, SEARCHED_RANGE * point.speed, coupled.loads, coupled.solution
         )
@@ -51,7 +50,7 @@ def equilibrium_of(
                 f"From {branch.limit * 30.0 / math.pi:.0f} rpm on there is no state: {branch.reason}"
             )
     ratios = {name: bearings[name].preload / force for name, force in assembled.items()}
-    return Equilibrium(follows_preload(spec), ratios, fold, searched, tuple(limits))
+    return Equilibrium(spec.follows_preload, ratios, fold, searched, tuple(limits))
 
 
 def assembled_preloads(spec: MachineSpec) -> dict[str, float]:

@@ -24,6 +24,7 @@ from spindle_fem.model.lumped.written_network import build_network, value_in_def
 from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for, options_for, recentred_model
+from spindle_fem.operation.bearing_heat import without_unasked_preload
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import Comparison, compare
 from spindle_fem.recordings.displaced_readings import with_displacements
@@ -98,6 +99,7 @@ def simulate_recordings(
 def _simulate_geometry(
     spec: MachineSpec, recording: Recording, calibration: Sequence[Recording], progress: Progress
 ) -> Simulation:
+    followed, (spec, left_out) = spec, without_unasked_preload(spec)
     fast = fast_model_for(spec, (recording, *calibration), as_given=not calibration, progress=progress)
     effects = effects_on(spec.effects, fast, recording)
     result = None
@@ -115,7 +117,7 @@ def _simulate_geometry(
         outside = _outside_range(predictor, factors)
     progress("simulation")
     predicted, half_width = _prediction(predictor, result)
-    notes = [*predictor.drives[0].notes, *_effect_notes(effects)]
+    notes = [*left_out, *predictor.drives[0].notes, *_effect_notes(effects)]
     if fast.inputs.extra_terms:
         what = (
             "ball contacts"
@@ -137,7 +139,7 @@ def _simulate_geometry(
         half_width,
         compare(recording, predicted),
         result,
-        None if result is None else write_machine(with_parameters(spec, result.factors)),
+        None if result is None else write_machine(with_parameters(followed, result.factors)),
         tuple(notes),
         {
             "basis": fast.model.size,

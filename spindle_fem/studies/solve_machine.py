@@ -117,7 +117,8 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         heat_in=balance.total_in, heat_in_by=dict(balance.heat_in), heat_out=dict(balance.films)
     )
     lumped = dict(zip(solution.problem.lumped_names, solution.lumped_temperature.tolist(), strict=True))
-    bearings = _bearings(machine, coupled, lumped)
+    around = machine.builder.bearing_temperatures(machine.field_state(solution.temperature, lumped))
+    bearings = _bearings(coupled, around)
     coolant = _coolant(machine, point, coupled)
     coldest = min([point.coldest, *(film.inlet_temperature for film in spec.circuits)])
     area_error, volume_error = operators.area_error(), operators.volume_error()
@@ -140,7 +141,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     circuits = _circuits(machine, point, coupled)
     if circuits:
         done.append(checks.check_circuits(circuit_mismatch(machine, solution, coupled.loads)))
-    warnings += [*_pump_pressure(spec, coolant), *_omitted_preload(machine, point, coupled, lumped)]
+    warnings += [*_pump_pressure(spec, coolant), *_omitted_preload(spec, point, coupled, around)]
     for lubricant in _lubricants(spec, bearings):
         done.append(lubricant)
         if not lubricant.passed:
@@ -160,6 +161,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         film_coefficient={name: film.coefficient for name, film in films.items()},
         fluid_temperature={name: film.temperature for name, film in films.items()},
         bearings=bearings,
+        bearing_temperatures=around,
         coolant=coolant,
         circuits=circuits,
         probes=_probes(machine, coupled, coolant, circuits),
@@ -177,12 +179,9 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     )
 
 
-def _bearings(
-    machine: PreparedMachine, coupled: CoupledState, lumped: Mapping[str, float]
-) -> dict[str, BearingResult]:
-    state = machine.field_state(coupled.solution.temperature, lumped)
+def _bearings(coupled: CoupledState, around: Mapping[str, BearingTemperatures]) -> dict[str, BearingResult]:
     found = {}
-    for name, temperatures in machine.builder.bearing_temperatures(state).items():
+    for name, temperatures in around.items():
         heat = coupled.loads.bearing_heat[name]
         found[name] = BearingResult(
             heat=heat.total,
@@ -203,15 +202,14 @@ def _bearings(
 
 
 def _omitted_preload(
-    machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState, lumped: Mapping[str, float]
+    spec: MachineSpec,
+    point: OperatingPoint,
+    coupled: CoupledState,
+    temperatures: Mapping[str, BearingTemperatures],
 ) -> list[CodedWarning]:
     """Warn of the preload change that the solved temperatures would cause where it is not modelled."""
-    spec = machine.spec
-    if spec.heat.thermal_preload or spec.heat.model == "table" or not spec.bearing_set:
+    if spec.follows_preload or spec.heat.model == "table" or not spec.bearing_set:
         return []
-    temperatures = machine.builder.bearing_temperatures(
-        machine.field_state(coupled.solution.temperature, lumped)
-    )
     hint = "heat.thermal_preload = true follows it."
     try:
         states = BearingMechanics(spec).states(point, temperatures, expand=True)
@@ -230,10 +228,11 @@ def _omitted_preload(
     name = max(grown, key=lambda key: (grown[key], states[key].heat.total))
     if not states[name].preload > 1.1 * cold[name].preload:
         return []
+    factors = {bearing.name: group.heat_factor.value for group, bearing in spec.bearings}
     text = (
         f"Thermal expansion is left out: at these temperatures the preload of {name} would be "
         f"{states[name].preload:.0f} N instead of {cold[name].preload:.0f} N, its friction heat "
-        f"{states[name].heat.total:.0f} W instead of {cold[name].total:.0f} W. {hint}"
+        f"{factors[name] * states[name].heat.total:.0f} W instead of {cold[name].total:.0f} W. {hint}"
     )
     return [CodedWarning("thermal_preload_omitted", text)]
 
@@ -380,17 +379,7 @@ def with_heat_study(result: ThermalResult) -> ThermalResult:
     spec = result.spec
     if spec.heat.model == "table" or not result.bearings:
         return result
-    temperatures = {
-        name: BearingTemperatures(
-            bearing.temperature_inner,
-            bearing.temperature_outer,
-            bearing.temperature_ball,
-            bearing.temperature_inner,
-            bearing.temperature_outer,
-        )
-        for name, bearing in result.bearings.items()
-    }
-    study = heat_study(spec, temperatures=temperatures)
+    study = heat_study(spec, temperatures=result.bearing_temperatures)
     return replace(result, heat_study=study) if study["models"] else result
 
 

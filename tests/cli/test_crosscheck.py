@@ -68,7 +68,9 @@ def test_flux_matching_meets_the_elements(result):
     _, content, _ = result
     speeds = content["matched"]["speeds"]
     assert min(row["matched_max_K"] for row in speeds) < 0.05
-    assert max(row["matched_max_K"] for row in speeds) < 1.0
+    # at other speeds the factors of one are half as far off as none
+    worst = {kind: max(row[f"{kind}_max_K"] for row in speeds) for kind in ("matched", "unmatched")}
+    assert worst["matched"] < 0.5 * worst["unmatched"]
     assert {500.0, 4500.0} <= {row["speed_rpm"] for row in speeds}
 
 

@@ -13,7 +13,7 @@ def test_the_python_lines_run():
     assert len([line for line in code.splitlines() if line.strip()]) <= 7
     process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert process.returncode == 0, process.stderr
-    assert "'SP01': 25.5" in process.stdout
+    assert "'SP01': 23.3" in process.stdout
 
 
 def test_every_command_that_it_names_exists(command):

@@ -14,9 +14,10 @@ from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.coupled_steady import LINEAR_RESIDUAL_LIMIT, solve_coupled
-from spindle_fem.solvers.prepared_machine import machine_on_mesh, prepare_machine
+from spindle_fem.solvers.prepared_machine import machine_on_mesh, prepare_machine, without_expansion
 from spindle_fem.studies.run_checks import require_checks
 from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared
+from tests.support.near_rings import NEAR_RINGS
 
 RPM = math.pi / 30.0
 
@@ -134,8 +135,30 @@ def test_reference_run_reports_every_friction_term(reference_result):
     assert sum(terms.values()) == pytest.approx(reference_result.bearings["F1"].heat)
     assert terms["inner_rolling"] > terms["ball_drag"] > terms["inner_sliding"]
     codes = {warning.code for warning in reference_result.warnings}
-    assert "thermal_preload_omitted" in codes
+    assert "thermal_preload_omitted" not in codes
     assert "coolant_film_extrapolated" in codes
+
+
+def test_the_reference_run_is_a_state_that_its_preload_allows(reference_result):
+    """Rings some kelvins apart, preload of two to four times that of assembly, fits that hold."""
+    equilibrium = reference_result.equilibrium
+    assert equilibrium.followed
+    assert 2.0 < equilibrium.preload_ratio["F3"] < 4.0
+    assert not equilibrium.limits
+    for name in ("F1", "F2", "F3"):
+        assert 3.0 < reference_result.bearings[name].ring_difference < 8.0
+        assert reference_result.growth.seats[name, "shaft"].pressure > 0.0
+
+
+def test_bearings_of_the_size_of_assembly_say_what_is_left_out(reference, reference_result):
+    machine = without_expansion(reference)
+    result = solve_prepared(machine)
+    (text,) = [item.text for item in result.warnings if item.code == "thermal_preload_omitted"]
+    told = re.search(r"preload of F3 would be (\d+) N instead of (\d+) N.* (\d+) W instead of (\d+) W", text)
+    hot, cold, more, less = (float(value) for value in told.groups())
+    assert hot > 1.3 * cold
+    assert less == pytest.approx(result.bearings["F3"].heat, abs=0.5)
+    assert less < more < 1.5 * reference_result.bearings["F3"].heat
 
 
 def test_heat_enters_balls_and_rings_by_the_share(reference_result):
@@ -147,9 +170,10 @@ def test_heat_enters_balls_and_rings_by_the_share(reference_result):
 @pytest.mark.parametrize("model", ["palmgren", "skf", "paper"])
 def test_every_heat_model_finds_its_fixed_point(reference, model):
     """Palmgren with cold grease first asks for more heat than its viscosity fit reaches."""
-    spec = reference.spec
-    changed = spec.model_copy(update={"heat": spec.heat.model_copy(update={"model": model})})
-    result = solve_prepared(prepare_machine(changed))
+    chosen = [f"heat.model={model}", "heat.thermal_preload=false"]
+    whole = [f"bearing_set.{name}.heat_factor=1" for name in ("front", "rear")]
+    spec = load_machine("wu_tan_2016", ["mesh.preset=coarse", "mesh.order=1", *chosen, *whole])
+    result = solve_prepared(machine_on_mesh(spec, reference.mesh, reference.operators))
     assert all(check.passed for check in result.checks)
     expected = {"palmgren": 300.0, "skf": 500.0, "paper": 17.0}[model]
     assert result.bearings["F1"].heat == pytest.approx(expected, rel=0.2)
@@ -170,7 +194,7 @@ def following():
     return prepare_machine(
         load_machine(
             "wu_tan_2016",
-            ["mesh.preset=coarse", "mesh.order=1", "heat.thermal_preload=true", "operation.speed=600rpm"],
+            ["mesh.preset=coarse", "mesh.order=1", *NEAR_RINGS, "operation.speed=1000rpm"],
         )
     )
 
@@ -184,7 +208,7 @@ def test_a_followed_preload_grows_and_its_fold_lies_above_the_running_speed(foll
     equilibrium = followed_result.equilibrium
     assert equilibrium.followed
     assert equilibrium.preload_ratio["F3"] > 2.0
-    assert 600.0 * RPM < equilibrium.fold_speed < 900.0 * RPM
+    assert 1000.0 * RPM < equilibrium.fold_speed < 1500.0 * RPM
     assert all(check.passed for check in followed_result.checks)
 
 
@@ -230,7 +254,7 @@ def test_spring_preload_keeps_its_force_when_the_rings_grow():
         [
             "mesh.preset=coarse",
             "mesh.order=1",
-            "heat.thermal_preload=true",
+            *NEAR_RINGS,
             # Warm rings lose their fit: the equilibrium of the sprung sets ends near 3000 rpm.
             "operation.speed=1500rpm",
             "bearing_set.front.preload_kind=spring",
@@ -272,16 +296,18 @@ def test_contacts_need_one_group_each(recorded):
     )
 
 
-def test_effects_act_where_balls_follow_their_contacts(reference, reference_result, tmp_path):
+def test_effects_act_where_balls_follow_their_contacts(reference, tmp_path):
     text = 'schema = "spindle-fem/machine/1"\nname = "more"\nbase = "wu_tan_2016"\n[[effect]]\n'
     text += 'effect = "heat_scale"\ncomponent = "front_bearings"\nparameters = {"heat.front" = 1.5}\n'
     (tmp_path / "more.toml").write_text(text, encoding="utf-8")
-    spec = load_machine(tmp_path / "more.toml", ["mesh.preset=coarse", "mesh.order=1"])
+    chosen = ["mesh.preset=coarse", "mesh.order=1", "heat.thermal_preload=false"]
+    spec = load_machine(tmp_path / "more.toml", chosen)
     assert spec.bearing_set[0].ball_row.kind == "contact"
-    more = solve_prepared(dataclasses.replace(reference, spec=spec))
+    rigid = without_expansion(reference)
+    more = solve_prepared(dataclasses.replace(rigid, spec=spec))
     heat, usual = (
         sum(bearing.heat for name, bearing in found.bearings.items() if name.startswith("F"))
-        for found in (more, reference_result)
+        for found in (more, solve_prepared(rigid))
     )
     # warmer grease takes some of it back
     assert 1.1 * usual < heat < 1.5 * usual

@@ -35,6 +35,7 @@ from spindle_fem.solvers.saved_state import load_state, save_state
 from spindle_fem.solvers.transient_records import balanced
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.transient_study import run_study, study_of, time_to_stay_within
+from tests.support.near_rings import NEAR_RINGS
 
 SMALL = ["mesh.preset=coarse", "mesh.order=1"]
 RPM = np.pi / 30.0
@@ -54,7 +55,9 @@ def lines(times, **inputs):
 @pytest.fixture(scope="module")
 def machine():
     """The reference spindle with catalogue friction: heat, films and coolant follow the temperatures."""
-    return prepare_machine(load_machine("wu_tan_2016", [*SMALL, "heat.model=palmgren"]))
+    return prepare_machine(
+        load_machine("wu_tan_2016", [*SMALL, "heat.model=palmgren", "heat.thermal_preload=false"])
+    )
 
 
 @pytest.fixture(scope="module")
@@ -416,7 +419,7 @@ def test_a_run_is_coupled_more_exactly_until_it_keeps_the_balance_that_was_asked
 @pytest.mark.slow
 def test_preload_follows_the_temperatures():
     """Rigid preload in a machine whose parts grow: it rises, at high speed until no equilibrium is left."""
-    machine = prepare_machine(load_machine("wu_tan_2016", [*SMALL, "heat.thermal_preload=true"]))
+    machine = prepare_machine(load_machine("wu_tan_2016", [*SMALL, *NEAR_RINGS]))
     calm = simulate_full(machine, held([0.0, 1800.0], speed=300 * RPM))
     preload = calm.steps.preload[:, calm.bearings.index("R1")]
     assert np.isfinite(preload).all()

@@ -13,6 +13,7 @@ from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.film_heat import FilmHeat
 from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.operation.bearing_heat import at_assembly_size
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
@@ -58,7 +59,7 @@ def test_expansion_is_refused_with_a_way_out(spec):
 def test_it_follows_the_full_model_whose_friction_follows_its_films(spec, fast):
     point, values = driven(spec)
     full = simulate_full(
-        prepare_machine(spec),
+        prepare_machine(at_assembly_size(spec)),
         InputHistory(TIMES, STANDARD, values, HELD),
         sample_times=TIMES[::3],
         options=TransientOptions(error=0.01),
@@ -110,7 +111,9 @@ def test_simulate_takes_it_and_a_calibrated_machine_keeps_its_heat_model(spec, f
     )
     assert found["channels"][0]["rmse_K"] < 0.12
     assert any('"full" friction and ball contacts from a map' in note for note in found["notes"])
+    assert any("thermal preload is left out" in note for note in found["notes"])
     written = load_machine(tmp_path / "out" / "calibrated_machine.toml")
     assert written.heat.model == "full"
+    assert written.follows_preload
     assert {group.ball_row.kind for group in written.bearing_set} == {"contact"}
     assert isinstance(fast.inputs.extra_terms[0], FilmHeat)

@@ -188,7 +188,9 @@ def test_a_design_outside_the_range_gets_no_answer(by_table, tmp_path):
 def test_heat_and_films_that_follow_the_temperature(tmp_path):
     """The reference spindle: friction, ball contacts and oil at their own temperature, wetted ports."""
     prepared = prepare_study(
-        "wu_tan_2016", study_file(tmp_path, size=8, backend="reduced", band="true", further=SPEEDS), QUICK
+        "wu_tan_2016",
+        study_file(tmp_path, size=8, backend="reduced", band="true", further=SPEEDS),
+        (*QUICK, "heat.thermal_preload=false"),
     )
     rows = answer_group(group_of(prepared), prepared.question)
     assert len(rows) == 8
@@ -234,10 +236,11 @@ def test_what_only_a_full_solve_has_is_refused_for_the_reduced_backend(tmp_path)
 
 def test_machines_that_no_projected_model_can_answer(tmp_path):
     path = study_file(tmp_path, size=2, backend="reduced")
-    prepared = prepare_study("wu_tan_2016", path, [*QUICK, "heat.thermal_preload=true"])
+    prepared = prepare_study("wu_tan_2016", path, QUICK)
     assert [task.structure for task in prepared.tasks] == ["", ""]
     assert "each place of its surface" in refusal(load_machine("small_two_start"))
-    assert refusal(load_machine("wu_tan_2016")) == ""
+    assert "preload follows" in refusal(load_machine("wu_tan_2016"))
+    assert refusal(load_machine("wu_tan_2016", ["heat.thermal_preload=false"])) == ""
 
 
 def test_a_model_comes_back_from_disk(by_table, tmp_path):

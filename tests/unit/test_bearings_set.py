@@ -26,6 +26,8 @@ from spindle_fem.physics.bearings.contact_conduction import (
     ball_conductance,
     constriction_resistance,
     contact_resistance,
+    film_conductance,
+    renewal_resistance,
 )
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
@@ -339,17 +341,36 @@ def test_contact_resistance() -> None:
     balls = state.balls
     one = 2.0 * float(constriction_resistance(balls.semi_major[0, INNER], balls.semi_minor[0, INNER], 46.0))
     half_ball = 1.0 / (math.pi * 46.0 * BEARING.ball_diameter)
-    assert inner == pytest.approx((one + half_ball) / 30)
+    at_rest = replace(state, balls=replace(balls, entrainment_speed=np.full((1, 2), np.nan)))
+    still = contact_resistance(at_rest, ring_conductivity=46.0, ball_conductivity=46.0)
+    assert still[0] == pytest.approx((one + half_ball) / 30)
+    # surfaces that are renewed at a Péclet number of 95 take ten times as much
+    assert 8.0 < still[0] / inner < 20.0
     assert outer < inner
     # a narrow ellipse conducts worse than a circle of its length, better than one of its width
     major, minor = balls.semi_major[0, INNER], balls.semi_minor[0, INNER]
     assert 1 / (4 * 46.0 * major) < one / 2 < 1 / (4 * 46.0 * minor)
     assert ball_conductance(state).inner == pytest.approx(1.0 / inner)
     wet = ball_conductance(state, GREASE)
-    assert wet.inner == pytest.approx(1.0 / inner + wet.lubricant)
+    assert wet.inner == pytest.approx(wet.inner_contact + wet.lubricant)
     assert wet.lubricant > 0.0
+    # the film is in the way: 1.2 W/K of it, 0.7 W/K of the oil around it
+    film = 30.0 * film_conductance(state, GREASE.thermal_conductivity)[0, INNER]
+    assert wet.inner_contact == pytest.approx(1.0 / (inner + 1.0 / film))
+    assert 1.2 < wet.inner_contact < 2.5
     with pytest.raises(SpecError, match="Give a >= b"):
         constriction_resistance(1.0, 2.0, 46.0)
+
+
+def test_renewed_surface_takes_what_a_fast_band_source_does() -> None:
+    """Strips of an ellipse along the motion, each with 4/3 q √(L α/(π u))/k as mean (Carslaw & Jaeger)."""
+    major, minor, speed, k, capacity = 0.8e-3, 0.09e-3, 12.0, 46.0, 7810.0 * 475.0
+    across = np.sin(np.linspace(-0.5 * np.pi, 0.5 * np.pi, 4001))
+    lengths = 2.0 * minor * np.sqrt(1.0 - across**2)
+    rise = 4.0 / 3.0 * np.sqrt(lengths * k / capacity / (np.pi * speed)) / k
+    area = np.pi * major * minor
+    mean = np.trapezoid(rise * lengths, across) / np.trapezoid(lengths, across)
+    assert float(renewal_resistance(major, minor, speed, k, capacity)) == pytest.approx(mean / area, rel=1e-4)
 
 
 def test_contact_resistance_without_contact_is_infinite() -> None:

@@ -256,7 +256,6 @@ def test_the_recorded_spindle_is_the_reference_spindle_otherwise():
         "surface",
         "gap",
         "probe",
-        "grease",
     ):
         assert getattr(RECORDED, field) == getattr(WU_TAN, field)
 

@@ -18,11 +18,12 @@ from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_o
 from spindle_fem.operation.friction_map import film_temperature
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.machine_network_steady import network_heat_model, solve_machine_network
+from tests.support.near_rings import NEAR_RINGS
 
 
 @pytest.fixture(scope="module")
 def friction_machine():
-    spec = load_machine("wu_tan_2016")
+    spec = load_machine("wu_tan_2016", ("heat.thermal_preload=false",))
     return build_machine_network(spec), OperatingPoint.of(spec), heat_model_of(spec)
 
 
@@ -80,11 +81,8 @@ def test_tables_stand_for_the_heat_model(friction_machine):
         assert tables.heat[name].c == pytest.approx(one_by_one.heat[name].c, rel=1e-6, abs=1e-9)
 
 
-PRELOAD = ("heat.thermal_preload=true", "operation.speed=500 rpm")
-
-
 def test_network_follows_the_preload_to_its_fixed_point():
-    spec = load_machine("wu_tan_2016", PRELOAD)
+    spec = load_machine("wu_tan_2016", (*NEAR_RINGS, "operation.speed=650 rpm"))
     network, point = build_machine_network(spec), OperatingPoint.of(spec)
     model = network_heat_model(network)
     state = solve_machine_network(network, point)
@@ -99,7 +97,7 @@ def test_network_follows_the_preload_to_its_fixed_point():
 
 @pytest.mark.slow
 def test_network_says_at_which_speed_equilibria_fold():
-    spec = load_machine("wu_tan_2016", ("heat.thermal_preload=true",))
+    spec = load_machine("wu_tan_2016", NEAR_RINGS)
     network, point = build_machine_network(spec), OperatingPoint.of(spec)
     with pytest.raises(NoSteadyStateError, match=r"no thermal equilibrium at 3000 rpm") as caught:
         solve_machine_network(network, point)

@@ -29,6 +29,12 @@ def spec():
 
 
 @pytest.fixture(scope="module")
+def factors(spec):
+    """On the friction heat of every bearing."""
+    return np.array([group.heat_factor.value for group, _ in spec.bearings])
+
+
+@pytest.fixture(scope="module")
 def friction(spec):
     return tabulate_friction(spec, 4500.0 * RPM, THRUSTS)
 
@@ -48,7 +54,7 @@ def context(term, temperatures, *, speed=3000.0 * RPM, thrust=1750.0):
     ("speed", "celsius", "thrust"),
     [(400.0, 15.0, 1750.0), (1500.0, 33.0, 1530.0), (3000.0, 61.0, 1750.0), (4200.0, 88.0, 1090.0)],
 )
-def test_the_map_is_the_heat_model_between_its_points(spec, friction, speed, celsius, thrust):
+def test_the_map_is_the_heat_model_between_its_points(spec, factors, friction, speed, celsius, thrust):
     given = OperatingPoint.of(spec)
     point = OperatingPoint(
         speed * RPM,
@@ -59,7 +65,7 @@ def test_the_map_is_the_heat_model_between_its_points(spec, friction, speed, cel
     )
     exact = BearingMechanics(spec).over_film_temperature(point, [celsius + 273.15])
     kelvin = np.full(len(friction.bearings), celsius + 273.15)
-    found = friction.heat(point.speed, thrust, kelvin)
+    found = factors * friction.heat(point.speed, thrust, kelvin)
     conductance = np.exp(friction.at(point.speed, thrust).at(kelvin[:, None], CONDUCTANCES))[:, :, 0]
     for row, name in enumerate(friction.bearings):
         assert found[row] == pytest.approx(exact[name].heat[0], rel=2e-3)
@@ -84,13 +90,14 @@ def test_balls_lose_their_lubricant_as_the_spindle_stops(spec, friction, rpm, wi
         assert np.all(found < 0.95 * turning)
 
 
-def test_table_and_term_together_are_the_map(spec, friction, table):
+def test_table_and_term_together_are_the_map(spec, factors, friction, table):
     term = FilmHeat(friction, spec, table)
     film = 273.15 + np.linspace(20.0, 50.0, len(friction.bearings))
     for speed, thrust in ((700.0 * RPM, 1750.0), (3900.0 * RPM, 1200.0)):
         factor = term.friction(context(term, np.repeat(film, 3)[:, None], speed=speed, thrust=thrust))
         tabulated = heat_of_table(table, np.array([speed]), np.array([thrust]))[0]
-        assert factor[:, 0].real * tabulated == pytest.approx(friction.heat(speed, thrust, film), rel=1e-9)
+        expected = factors * friction.heat(speed, thrust, film)
+        assert factor[:, 0].real * tabulated == pytest.approx(expected, rel=1e-9)
     assert term.friction(context(term, np.repeat(film, 3)[:, None], speed=0.0)).tolist() == [[1.0]] * 5
 
 

@@ -48,7 +48,7 @@ def test_a_series_of_one_state_is_constant_and_others_go_on_along_their_tangent(
 @pytest.mark.parametrize("model", ["palmgren", "full", "table"])
 def test_a_table_answers_as_the_heat_model_does(model):
     """Bearings of a set at temperatures of their own: what each feels of the others is left out."""
-    spec = load_machine("wu_tan_2016", [f"heat.model={model}"])
+    spec = load_machine("wu_tan_2016", [f"heat.model={model}", "heat.thermal_preload=false"])
     point = OperatingPoint.of(spec)
     tables = BearingTables(285.0, 345.0)
     table = tables.of(spec, point, mechanical_keys([spec], [point])[0])

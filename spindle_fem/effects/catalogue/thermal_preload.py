@@ -168,7 +168,7 @@ class ThermalPreload(Effect):
 
     def in_definition(self, spec: MachineSpec) -> bool:
         """Machines whose heat follows thermal expansion."""
-        return spec.heat.thermal_preload
+        return spec.follows_preload
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """For each bearing set, the power law and, where there are fits, the mechanics."""

@@ -73,7 +73,7 @@ def tabulate_friction(
         The grease is known at too few of the temperatures.
     NoEquilibriumError
     """
-    if spec.heat.model == "table" or spec.heat.thermal_preload or not spec.bearing_set:
+    if spec.heat.model == "table" or spec.follows_preload or not spec.bearing_set:
         return None
     base = point.ambient_temperature
     known = _REMEMBERED.setdefault(heat_model, {}) if isinstance(heat_model, BearingMechanics) else {}

@@ -118,6 +118,7 @@ LUBRICANT: dict[str, Reader] = {
     "viscosity_law": _text("walther", "roelands"),
     "pressure_viscosity": _quantity("1/Pa"),
     "limiting_shear_ratio": _NUMBER,
+    "limiting_shear_slope": _quantity("1/K"),
     "asperity_friction": _NUMBER,
     "thermal_conductivity": _quantity("W/(m*K)"),
     "film_starvation": _NUMBER,

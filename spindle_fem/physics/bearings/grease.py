@@ -39,7 +39,9 @@ class Lubricant:
     pressure_viscosity : float or None, [1/Pa]
         At 40 °C; None: what Roelands's pressure exponent 0.68 implies.
     limiting_shear_ratio : float, [-]
-        Limiting shear stress over pressure, 0.03-0.1.
+        Limiting shear stress over pressure at 40 °C, 0.03-0.1.
+    limiting_shear_slope : float, [1/K]
+        Relative fall of that ratio with temperature.
     asperity_friction : float, [-]
         Friction coefficient of touching asperities, 0.1-0.15.
     thermal_conductivity : float, [W/(m K)]
@@ -70,6 +72,7 @@ class Lubricant:
     viscosity_law: Literal["walther", "roelands"] = "walther"
     pressure_viscosity: float | None = None
     limiting_shear_ratio: float = 0.07
+    limiting_shear_slope: float = 0.0
     asperity_friction: float = 0.12
     thermal_conductivity: float = 0.14
     film_starvation: float = 1.0
@@ -92,7 +95,7 @@ class Lubricant:
             )
         for key, low, high in (
             ("density", 500.0, 2500.0), ("density_slope", 0.0, 2e-3), ("limiting_shear_ratio", 0.005, 0.2),
-            ("asperity_friction", 0.0, 0.5),
+            ("limiting_shear_slope", 0.0, 2e-2), ("asperity_friction", 0.0, 0.5),
             ("thermal_conductivity", 0.05, 1.0), ("film_starvation", 0.05, 1.0),
             ("path_fill", 0.0, 0.3), ("temperature_limit", 273.15, 700.0),
         ):  # fmt: skip
@@ -195,6 +198,18 @@ class Lubricant:
         """
         logarithm = np.log(self.dynamic_viscosity(temperature)) + ROELANDS_LOGARITHM
         return ROELANDS_PRESSURE * self.roelands_pressure_exponent * logarithm
+
+    def limiting_shear_ratio_at(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Limiting shear stress over pressure at a temperature (K), falling exponentially from 40 °C.
+
+        Source: Wikström & Höglund (1994), J. Tribol. 116, 612-620, for the fall; -20 to 110 °C.
+
+        >>> oil = Lubricant(21e-6, 4.7e-6, limiting_shear_ratio=0.05, limiting_shear_slope=0.01)
+        >>> oil.limiting_shear_ratio_at([313.15, 323.15]).round(4).tolist()
+        [0.05, 0.0452]
+        """
+        above = np.asarray(temperature, float) - CELSIUS_40
+        return self.limiting_shear_ratio * np.exp(-self.limiting_shear_slope * above)
 
     def temperature_warnings(self, temperature: float, name: str = "bearing") -> tuple[CodedWarning, ...]:
         """Warnings that a temperature (K) earns."""

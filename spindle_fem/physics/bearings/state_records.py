@@ -55,7 +55,7 @@ def lubricant_state(
         lubricant.viscosity_slope(temperature),
         lubricant.pressure_viscosity_coefficient(temperature),
         constant * lubricant.roelands_pressure_exponent,
-        constant * lubricant.limiting_shear_ratio,
+        lubricant.limiting_shear_ratio_at(temperature),
         constant * lubricant.asperity_friction,
         constant * lubricant.film_starvation,
         constant * lubricant.thermal_conductivity,

@@ -13,6 +13,7 @@ from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.defined_effects import effects_on
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for, options_for
+from spindle_fem.operation.bearing_heat import without_unasked_preload
 from spindle_fem.recordings.align import Recording
 from spindle_fem.studies.export.geometry_export import geometry_state_space
 from spindle_fem.studies.export.network_export import network_inputs, network_state_space
@@ -50,8 +51,12 @@ def machine_state_space(
         turning = [item.name for item in network_inputs(fast.network) if item.magnitude]
         day = day_of_a_network(fast.network, turning)
         return network_state_space(fast, spec.name, effects_on(spec.effects, fast, day))
+    spec, left_out = without_unasked_preload(spec)
     fast = fast_model_for(spec, recordings, as_given=True, progress=progress)
     progress("tables over speed and coolant")
     effects = effects_on(spec.effects, fast, at_the_defined_point(spec))
     highest = options_for(spec, recordings).highest_speed_of(spec)
-    return geometry_state_space(fast, spec.name, highest, effects)
+    space = geometry_state_space(fast, spec.name, highest, effects)
+    if left_out:
+        space.header["notes"][:0] = left_out
+    return space

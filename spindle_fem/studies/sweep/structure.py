@@ -60,7 +60,7 @@ def refusal(spec: MachineSpec) -> str:
     """Reason why a projected model cannot represent a machine; empty if it can."""
     if any(isinstance(film, NaturalFilm) for film in spec.film):
         return "a film follows the temperature of each place of its surface"
-    if spec.heat.thermal_preload and spec.heat.model != "table":
+    if spec.follows_preload:
         return "the preload follows the temperatures"
     if any(group.conductance == "perfect" for group in spec.joint):
         return "a joint has no resistance"
