@@ -78,6 +78,10 @@ class Material(SpecModel):
         return self.density * self.specific_heat_capacity
 
 
+# m; a unit was mistaken beyond it.
+_LARGEST_PART = 5.0
+
+
 class AnnulusSegment(SpecModel):
     """A ring of rectangular meridian section."""
 
@@ -92,6 +96,16 @@ class AnnulusSegment(SpecModel):
 
     @model_validator(mode="after")
     def _check(self) -> AnnulusSegment:
+        sizes = {"z": max(map(abs, self.z)), "outer_diameter": self.outer_diameter}
+        vast = [
+            Fault(
+                key, f"{size:g} m is no spindle's.", f"Allowed: up to {_LARGEST_PART:g} m; is the unit right?"
+            )
+            for key, size in sizes.items()
+            if size > _LARGEST_PART
+        ]
+        if vast:
+            raise_faults(vast)
         if self.inner_diameter >= self.outer_diameter:
             raise_faults(
                 [

@@ -61,6 +61,11 @@ def test_each_bearing_has_its_own_rings_and_balls(tmp_path):
         ("bearing_set.front.bearing.F2.bearing_type=7214 C", None),
         ("bearing_types.7012_C.radial_clearance=5 um", "radial_clearance: .*contact_angle instead"),
         ("bearing_types.7012_C.seal_moment=-1 N*m", "seal_moment"),
+        ("part.shaft.segment.nose.outer_diameter=88 m", r"nose\.outer_diameter: 88 m .*is the unit right"),
+        (
+            "part.shaft.segment.nose.outer_diameter=120 mm",
+            r'"F1\.outer_ring\|shaft:face" has no conductance. One turns and the other stands: leave a gap',
+        ),
     ],
 )
 def test_what_does_not_go_together_is_told(change, told):

@@ -35,11 +35,14 @@ def group_of_contacts(spec: MachineSpec, contacts: Iterable[str]) -> dict[str, J
             for name in matched:
                 if group not in groups[name]:
                     groups[name].append(group)
+    turns = {part.name: part.rotating for part in spec.part}
+    turns |= {f"{bearing.name}.inner_ring": True for _, bearing in spec.bearings}
     for name, owners in groups.items():
         if not owners:
-            faults.append(
-                SpecError("joint", f'the contact "{name}" has no conductance.', "Add it to a [[joint]].")
-            )
+            how = "Add it to a [[joint]]."
+            if len({turns.get(part, False) for part in name.removesuffix(":face").split("|")}) == 2:
+                how = "One turns and the other stands: leave a gap between them. Or add it to a [[joint]]."
+            faults.append(SpecError("joint", f'the contact "{name}" has no conductance.', how))
         elif len(owners) > 1:
             listing = " and ".join(owner.name for owner in owners)
             faults.append(SpecError("joint", f'the contact "{name}" is claimed by {listing}.'))
