@@ -13,6 +13,7 @@ from spindle_fem.definition.exchange_tables import (
     FaceSelector,
     Fluid,
     NaturalFilm,
+    PumpCurve,
     RotatingFilm,
     Surface,
 )
@@ -21,6 +22,7 @@ from spindle_fem.definition.field_types import (
     Name,
     PositiveLength,
     PositiveNumber,
+    Pressure,
     Range,
     Temperature,
     UncertainNumber,
@@ -86,7 +88,11 @@ class CircuitFilm(StreamFilm):
     inlet_temperature: Temperature
     """Temperature at the inlet."""
     flow: VolumeFlow
-    """Through the duct."""
+    """Through the duct; less flows where the pump's pressure does not suffice."""
+    pressure_limit: Pressure | None = None
+    """Of the pump's relief valve: the flow through the duct takes no more."""
+    pump_curve: PumpCurve | None = None
+    """What the pump gives: no more flows than the duct takes at its pressure."""
     law: DuctLaw = "straight"
     """Correlation of the film."""
     factor: UncertainNumber = Uncertain(1.0)

@@ -7,7 +7,7 @@ temperatures of the walls. Every model takes the warming from here.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,14 @@ from spindle_fem.physics.coolant.falling_film import falling_film
 from spindle_fem.physics.coolant.linear_march import march_maps
 from spindle_fem.physics.coolant.lubrication_kinds import LUBRICATION_KINDS
 from spindle_fem.physics.coolant.properties import coolant_by_name
+from spindle_fem.physics.coolant.pump import PUMP_PRESSURE, Pump
 from spindle_fem.physics.coolant.streams import StreamAnswer
 from spindle_fem.validity import CodedWarning
 
 Array = NDArray[np.float64]
+
+# Pa; a tenth of the atmosphere.
+AIR_PRESSURE_DROP = 1.0e4
 
 
 def stream_answer(film: StreamFilm, speed: float) -> StreamAnswer:
@@ -43,22 +47,44 @@ def stream_answer(film: StreamFilm, speed: float) -> StreamAnswer:
     return StreamAnswer(
         coefficient=in_duct * flow.section.wetted_ratio,
         capacity_rate=flow.capacity_rate,
+        volume_flow=flow.volume_flow,
         reynolds=flow.reynolds,
         prandtl=flow.prandtl,
         velocity=flow.velocity,
         regime=flow.regime,
         pressure_drop=flow.pressure_drop,
         source=answer.source,
-        faults=answer.faults,
+        faults=(*answer.faults, *_expansion(film, flow)),
     )
+
+
+def _expansion(film: CircuitFilm, flow: DuctFlow) -> tuple[str, ...]:
+    """Air whose pressure falls by more than a tenth of an atmosphere is no fluid of constant density."""
+    if film.fluid != "air" or flow.pressure_drop <= AIR_PRESSURE_DROP:
+        return ()
+    return (f"air expands as its pressure falls by {1e-5 * flow.pressure_drop:.2g} bar",)
 
 
 def stream_warnings(film: StreamFilm, answer: StreamAnswer) -> tuple[CodedWarning, ...]:
     """Warnings of values outside the range of a stream's laws."""
-    if not answer.faults:
-        return ()
-    text = f"Circuit {film.name}: {'; '.join(answer.faults)} ({answer.source})."
-    return (CodedWarning("circuit_film_extrapolated", text),)
+    found = []
+    pressure = f"{1e-5 * answer.pressure_drop:.3g} bar"
+    if answer.volume_flow < film.flow * (1.0 - 1.0e-9):
+        text = (
+            f"Circuit {film.name}: the pump drives {6e4 * answer.volume_flow:.3g} L/min instead of "
+            f"{6e4 * film.flow:.3g}: the duct takes {pressure}, all that is given at that flow."
+        )
+        found.append(CodedWarning("coolant_flow_limited", text))
+    elif answer.pressure_drop > PUMP_PRESSURE:
+        text = (
+            f"Circuit {film.name} takes {pressure} at {6e4 * film.flow:.3g} L/min; pumps of coolers give up "
+            f"to {1e-5 * PUMP_PRESSURE:.0f} bar, so less will flow: pressure_limit or pump_curve says what."
+        )
+        found.append(CodedWarning("coolant_pressure", text))
+    if answer.faults:
+        text = f"Circuit {film.name}: {'; '.join(answer.faults)} ({answer.source})."
+        found.append(CodedWarning("circuit_film_extrapolated", text))
+    return tuple(found)
 
 
 def capacity_rate(film: StreamFilm) -> float:
@@ -81,7 +107,17 @@ def duct_flow(film: CircuitFilm, speed: float = 0.0) -> DuctFlow:
     )
     coolant = coolant_by_name(film.fluid)
     section = DUCT_KINDS[film.duct](shape)
-    return DuctFlow(section, film.length, coolant, film.flow, film.inlet_temperature, speed)
+    asked = DuctFlow(section, film.length, coolant, film.flow, film.inlet_temperature, speed)
+    curve = film.pump_curve
+    pump = Pump(
+        film.flow,
+        np.inf if film.pressure_limit is None else film.pressure_limit,
+        () if curve is None else curve.flow,
+        () if curve is None else curve.pressure,
+    )
+    return replace(
+        asked, volume_flow=pump.delivered(lambda flow: replace(asked, volume_flow=flow).pressure_drop)
+    )
 
 
 @dataclass(frozen=True, slots=True)

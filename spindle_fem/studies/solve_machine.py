@@ -16,6 +16,7 @@ from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.circuits import stream_answer
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.coolant.pump import PUMP_PRESSURE
 from spindle_fem.results.thermal_result import (
     BearingResult,
     CircuitResult,
@@ -40,8 +41,6 @@ from spindle_fem.validity import CodedWarning, by_consequence
 
 # Between the element sizes of the two meshes of an estimate.
 REFINEMENT_RATIO = 1.5
-# Pressure of circulation pumps in spindle coolers, which give 3 to 6 bar.
-PUMP_PRESSURE = 6.0e5
 
 
 def solve(
@@ -332,7 +331,7 @@ def _circuits(
         areas = {name: float(machine.builder.facet_area[name].sum()) for name in film.surface}
         films = {name: float(coupled.loads.films[name].coefficient.mean()) for name in film.surface}
         found[film.name] = CircuitResult(
-            flow=film.flow,
+            flow=answer.volume_flow,
             inlet_temperature=film.inlet_temperature,
             outlet_temperature=outlets[film.name],
             heat=float(sum(coupled.solution.balance.films[name] for name in film.surface)),

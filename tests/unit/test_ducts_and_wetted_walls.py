@@ -161,6 +161,36 @@ def test_a_thin_film_conducts_by_nusselts_law():
     assert float(nusselt_schnabel(10.0, 7.0, 1e-9)) == pytest.approx(1.3 * 10.0 ** (-1.0 / 3.0))
 
 
+def test_a_pump_that_gives_less_drives_less():
+    wide = BORES | {"flow": "24 L/min"}
+    free = stream_answer(film_of(wide), 0.0)
+    film = film_of(wide | {"pressure_limit": f"{0.25 * free.pressure_drop:.9f} Pa"})
+    held = stream_answer(film, 0.0)
+    assert held.pressure_drop == pytest.approx(0.25 * free.pressure_drop, rel=1e-6)
+    # Turns and turbulent friction take nearly the square of the flow.
+    assert 0.45 < held.volume_flow / free.volume_flow < 0.5
+    assert held.capacity_rate / free.capacity_rate == pytest.approx(held.volume_flow / free.volume_flow)
+    (warning,) = stream_warnings(film, held)
+    assert warning.code == "coolant_flow_limited"
+    assert "jacket" in warning.text
+
+
+def test_what_no_pump_drives_and_what_expands_are_told():
+    (warning,) = (
+        item
+        for item in stream_warnings(*_asked(BORES | {"flow": "200 L/min"}))
+        if item.code == "coolant_pressure"
+    )
+    assert "6 bar" in warning.text
+    told = [item.text for item in stream_warnings(*_asked(PURGE | {"flow": "1000 L/min"}))]
+    assert any("air expands" in text for text in told)
+
+
+def _asked(table):
+    film = film_of(table)
+    return film, stream_answer(film, 0.0)
+
+
 @pytest.mark.parametrize(
     ("table", "fault"),
     [

@@ -58,6 +58,7 @@ def falling_film(
     return StreamAnswer(
         coefficient=nusselt * float(liquid.thermal_conductivity) / scale,
         capacity_rate=density * float(liquid.specific_heat_capacity) * flow,
+        volume_flow=flow,
         reynolds=reynolds,
         prandtl=prandtl,
         velocity=flow / width / thickness,

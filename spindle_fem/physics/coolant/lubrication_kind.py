@@ -168,6 +168,7 @@ def oil_film(stream: BearingStream) -> StreamAnswer:
     return StreamAnswer(
         coefficient=max(still, float(turning)),
         capacity_rate=float(oil.density * oil.specific_heat_capacity) * stream.oil_flow,
+        volume_flow=stream.oil_flow,
         reynolds=velocity * stream.pitch_diameter / viscosity,
         prandtl=prandtl,
         velocity=velocity,

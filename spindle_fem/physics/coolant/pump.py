@@ -11,6 +11,8 @@ from scipy.optimize import brentq
 from spindle_fem.errors import OutOfValidityError
 from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
+# Pressure of circulation pumps in spindle coolers, which give 3 to 6 bar.
+PUMP_PRESSURE = 6.0e5
 # Relative tolerance of the flow delivered, and smallest flow considered, relative to the requested flow.
 _TOLERANCE = 1.0e-12
 _TRICKLE = 1.0e-9

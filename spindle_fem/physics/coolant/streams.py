@@ -15,6 +15,8 @@ class StreamAnswer:
         On the walls as they are drawn, before the film's own factor.
     capacity_rate : float, [W/K]
         Mass flow times heat capacity.
+    volume_flow : float, [m³/s]
+        What flows, at the inlet.
     reynolds, prandtl : float, [-]
     velocity : float, [m/s]
     pressure_drop : float, [Pa]
@@ -26,6 +28,7 @@ class StreamAnswer:
 
     coefficient: float
     capacity_rate: float
+    volume_flow: float
     reynolds: float
     prandtl: float
     velocity: float

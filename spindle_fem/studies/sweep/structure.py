@@ -22,7 +22,7 @@ _FREE_OF_LISTS = {
     "joint": ("conductance",),
 }
 # The diameter of a circuit is that of its walls.
-_FREE_OF_CIRCUITS = ("fluid", "inlet_temperature", "flow", "law", "factor")
+_FREE_OF_CIRCUITS = ("fluid", "inlet_temperature", "flow", "law", "factor", "pressure_limit", "pump_curve")
 _FREE_OF_MATERIALS = ("thermal_conductivity", "density", "specific_heat_capacity")
 _FREE_TABLES = ("grease", "heat_capacity_factor", "factor", "initial", "name", "title", "description")
 

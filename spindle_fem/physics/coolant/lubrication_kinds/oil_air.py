@@ -47,6 +47,7 @@ def film(stream: BearingStream) -> StreamAnswer:
     return StreamAnswer(
         coefficient=float(film_of_air(velocity, extrapolate=True)),
         capacity_rate=rate,
+        volume_flow=stream.air_flow,
         reynolds=velocity * width / VISCOSITY,
         prandtl=DENSITY * HEAT_CAPACITY * VISCOSITY / CONDUCTIVITY,
         velocity=velocity,
