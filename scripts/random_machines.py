@@ -193,7 +193,7 @@ def _bodies(
     found: dict[str, Any] = {"film": []}
     if cooling == "annulus":
         inside = 0.5 * (clear + whole)
-        slit = float(generator.uniform(2.0, 6.0))
+        slit = min(float(generator.uniform(2.0, 6.0)), 0.5 * (whole - inside) - 3.0)
         housing[2:3] = [
             ("middle", z_front + 8.0, z_rear, clear, inside),
             ("jacket", z_front + 8.0, z_rear, inside + 2.0 * slit, whole),

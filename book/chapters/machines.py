@@ -20,7 +20,7 @@ MACHINES = {
     ),
     "motor_spindle": ("built-in motor, 7014 C and 7012 C, glycol", "none"),
     "grinding_spindle": (
-        "belt, 7016 C triplex and 7014 C, oil-air as a lubrication factor",
+        "belt, 7016 C triplex and 7014 C, oil-air",
         "Kim, Zverev & Lee (2010), Intelligent Information Management 2: abstract only",
     ),
     "belt_lathe": ("belt, NN3018 K, 7018 AC pair, NN3016 K", "none"),
