@@ -1,4 +1,4 @@
-"""Thermal design of grease-lubricated machine-tool spindles by finite elements.
+"""Thermal design of machine-tool spindles by finite elements.
 
 The functions named in ``__all__`` are loaded when they are first used, so that
 ``import spindle_fem`` stays light.

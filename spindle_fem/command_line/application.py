@@ -63,7 +63,7 @@ class _Commands(TyperGroup):
 app = typer.Typer(
     name="spindle-fem",
     cls=_Commands,
-    help="Thermal finite elements for grease-lubricated machine-tool spindles.",
+    help="Thermal finite elements for machine-tool spindles.",
     no_args_is_help=True,
     epilog="Exit status: 0 done, 2 bad input (the message names file, key, value and what is allowed), "
     "130 interrupted, 1 anything else.",

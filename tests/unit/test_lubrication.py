@@ -113,6 +113,42 @@ def test_the_catalogue_formula_says_that_it_leaves_drag_out(spec, tmp_path):
     assert "front" not in said["oil_drag_omitted"]
 
 
+def test_rollers_in_oil_have_the_factor_of_their_lubrication(tmp_path):
+    oil = """
+schema = "spindle-fem/machine/1"
+base = "belt_lathe"
+name = "oiled_lathe"
+[[bearing_set]]
+name = "{name}"
+[bearing_set.lubrication]
+kind = "circulating_oil"
+oil = "iso_vg_22"
+oil_flow = "1 L/min"
+inlet_temperature = "25 degC"
+"""
+    plain = load_machine("belt_lathe")
+    group = next(g for g in plain.bearing_set if g.bearing_type.startswith("NN3018"))
+    path = tmp_path / "lathe.toml"
+    path.write_text(oil.format(name=group.name), encoding="utf-8")
+    name, heats = group.bearing[0].name, []
+    for change in ((), (f"bearing_set.{group.name}.lubrication.palmgren_f0=4.4",)):
+        own = load_machine(str(path), list(change))
+        warm = {bearing.name: BearingTemperatures(*(313.15,) * 5) for _, bearing in own.bearings}
+        heats.append(BearingMechanics(own)(OperatingPoint.of(own), warm)[0][name])
+    # 2.2 of the kind against 4.4 of the definition, of the part that needs no load.
+    assert heats[1].terms["viscous"] == pytest.approx(2.0 * heats[0].terms["viscous"], rel=1e-12)
+    assert heats[1].terms["load"] == pytest.approx(heats[0].terms["load"], rel=1e-12)
+
+
+def test_a_fill_that_is_cut_off_is_told(spec):
+    flooded = film(spec, "R1")
+    more = flooded.model_copy(
+        update={"lubrication": flooded.lubrication.model_copy(update={"oil_flow": 1.0e-4})}
+    )
+    texts = [item.text for item in stream_warnings(more, stream_answer(more, 12_000 * RPM))]
+    assert any("0.15 is taken" in text for text in texts)
+
+
 def test_streams_are_made_once(spec):
     again = type(spec).model_validate(spec.model_dump(mode="json", by_alias=True))
     assert [film.name for film in again.circuits] == [film.name for film in spec.circuits]

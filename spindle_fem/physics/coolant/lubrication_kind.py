@@ -114,10 +114,14 @@ def path_fill_parker(flow: Array, speed: Array, pitch: Array) -> Array:
 
 def flooded_fill(stream: BearingStream) -> float:
     """Parker's share, at most ``MOST_FILL``; 0 at rest, where nothing drags."""
+    return min(MOST_FILL, _parker(stream))
+
+
+def _parker(stream: BearingStream) -> float:
     if stream.rpm == 0.0:
         return 0.0
     flow, pitch = 6.0e7 * stream.oil_flow, 1.0e3 * stream.pitch_diameter
-    return min(MOST_FILL, float(path_fill_parker(flow, stream.rpm, pitch, extrapolate=True)))
+    return float(path_fill_parker(flow, stream.rpm, pitch, extrapolate=True))
 
 
 @correlation(prandtl=(0.5, 1.0e4))
@@ -165,6 +169,8 @@ def oil_film(stream: BearingStream) -> StreamAnswer:
     if stream.rpm:
         pitch = 1.0e3 * stream.pitch_diameter
         faults += path_fill_parker.faults(flow=6.0e7 * stream.oil_flow, speed=stream.rpm, pitch=pitch)
+        if _parker(stream) > MOST_FILL:
+            faults.append(f"oil fills {_parker(stream):.2f} of the path, {MOST_FILL:g} is taken")
     return StreamAnswer(
         coefficient=max(still, float(turning)),
         capacity_rate=float(oil.density * oil.specific_heat_capacity) * stream.oil_flow,
