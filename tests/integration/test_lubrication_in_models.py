@@ -8,6 +8,7 @@ import pytest
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.catalogue.coolant_film import CoolantFilm
+from spindle_fem.effects.catalogue.grease_churning import GreaseChurning
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.machine.view.defined_point import at_the_defined_point
 from spindle_fem.machine.view.machine_names import MachineNames
@@ -94,7 +95,9 @@ def test_a_transient_balances_and_reads_the_oil_at_each_speed(machine):
     assert run.readings[1, column] < run.readings[0, column]
 
 
-def test_oil_is_no_circuit_that_fouls(spec):
+def test_oil_neither_fouls_nor_churns_as_grease(spec):
     view = view_of(MachineNames.of(spec), at_the_defined_point(spec))
     assert not any("lubrication" in candidate.component for candidate in CoolantFilm().forms(view))
+    churning = {candidate.component for candidate in GreaseChurning().forms(view)}
+    assert not churning
     assert not any("raceway" in name for films in view.films.values() for name in films)

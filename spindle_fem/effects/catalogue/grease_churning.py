@@ -120,6 +120,8 @@ class GreaseChurning(Effect):
         """Once, or at every start; sets, single bearings and sources."""
         found = []
         for key, bearings in machine.sets.items():
+            if machine.oiled and set(bearings) <= set(machine.oiled):
+                continue
             # Every start of a single bearing anew is left to its set: grease rests in all of them.
             forms = (("", False), (RESTARTS, True)) if key in machine.groups else (("", False),)
             for speed in machine.running(key):

@@ -226,7 +226,9 @@ class MachineView:
     ring_share : float
         Share of both rings together.
     viscosity : (float, float), [m²/s]
-        Kinematic, of the grease's oil at 40 and 100 °C.
+        Kinematic, of the oil or the grease's oil at 40 and 100 °C.
+    oiled : tuple of str
+        Bearings in oil instead of grease.
     coolant_links : mapping of boundary to tuple of str
         Links of a network to one coolant, in the order in which it passes them.
     conductance : mapping of coefficient to float, [W/K]
@@ -282,6 +284,7 @@ class MachineView:
     ring_share: float = 1.0
     # Klueber Isoflex NBU 15, a usual grease of spindle bearings.
     viscosity: tuple[float, float] = (21.0e-6, 4.7e-6)
+    oiled: tuple[str, ...] = ()
     coolant_links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     conductance: Mapping[str, float] = field(default_factory=dict)
     source_inputs: Mapping[str, str] = field(default_factory=dict)

@@ -106,6 +106,7 @@ def view_of(names: MachineNames, recording: Recording) -> MachineView:
         reynolds=_reynolds(channel, inputs["coolant_flow"], inputs["coolant_inlet"]),
         friction=tables if spec.heat.model == "table" else {},
         inner_share=spec.heat.inner_share.value,
+        oiled=tuple(bearing.name for group, bearing in spec.bearings if group.lubrication is not None),
         ring_share=1.0 - spec.heat.ball_share,
         surroundings=surroundings,
         **_viscosity(spec),

@@ -72,15 +72,15 @@ def crosscheck(spec: MachineSpec, tell: Progress = lambda stage: None) -> Crossc
     Raises
     ------
     SpecError
-        A machine with circuits beside its channel.
+        A machine with streams beside its channel.
     SpindleFemError
         A model that has no solution.
     """
     if spec.circuits:
         raise SpecError(
             f"film.{spec.circuits[0].name}",
-            "is a circuit beside the channel, which crosscheck does not take apart node by node.",
-            "Leave it out (remove = true in a definition on this one's base).",
+            "is a stream beside the channel, which crosscheck does not take apart node by node.",
+            "Leave it out (remove = true in a definition on this one's base; oil: the set's lubrication).",
         )
     point = OperatingPoint.of(spec)
     tell("network")
