@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis_fit import Coordinate, Fit
 from spindle_fem.inference.mismatch_place import component_shares
 from spindle_fem.inference.next_measurement import hypothesis_words
@@ -203,7 +204,8 @@ def _heat(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _sets(diagnosis: Diagnosis) -> dict[str, Any]:
-    ranked = rank(diagnosis.hypotheses)
+    coarseness = tuned.NETWORK_COARSENESS if diagnosis.predictor.is_network else 1.0
+    ranked = rank(diagnosis.hypotheses, coarseness)
     share = 1.0 - diagnosis.judgement.other
     chosen = diagnosis.judgement.chosen.fit.keys
     return {
