@@ -69,7 +69,30 @@ def test_the_network_gives_the_oil_about_as_much(result, spec):
     assert network.imbalance_relative < 1e-10
 
 
-def test_the_fast_model_settles_where_the_elements_do(machine):
+# Recordings' fast models have heat by table and ball rows of constant conductance.
+TABLE = """
+schema = "spindle-fem/machine/1"
+base = "oiled.toml"
+name = "tabled"
+[heat]
+model = "table"
+[heat.table]
+speed = ["0 rpm", "24000 rpm"]
+heat = {F1 = ["0 W", "60 W"], F2 = ["0 W", "60 W"], R1 = ["0 W", "80 W"], R2 = ["0 W", "80 W"]}
+[[bearing_set]]
+name = "front"
+ball_row = {kind = "constant", conductance = "3 W/K"}
+[[bearing_set]]
+name = "rear"
+ball_row = {kind = "constant", conductance = "3 W/K"}
+"""
+
+
+def test_the_fast_model_settles_where_the_elements_do(tmp_path):
+    oiled(tmp_path)
+    path = tmp_path / "tabled.toml"
+    path.write_text(TABLE, encoding="utf-8")
+    machine = prepare_machine(load_machine(str(path), SMALL))
     spec = with_parameters(machine.spec, {"film.R1.lubrication": 0.6})
     fast = fast_spindle(reduced_model_of(machine.spec), machine.spec)
     point = replace(OperatingPoint.of(machine.spec), ambient_temperature=293.15)
