@@ -24,7 +24,16 @@ def on_path(monkeypatch):
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     monkeypatch.syspath_prepend(str(BENCHMARKS / "peers"))
     yield
-    for name in ("case", "comparison", "stages", "scale", "protocol", "numbering", "solved_space"):
+    for name in (
+        "case",
+        "comparison",
+        "stages",
+        "scale",
+        "scheduler",
+        "protocol",
+        "numbering",
+        "solved_space",
+    ):
         sys.modules.pop(name, None)
 
 
@@ -169,15 +178,22 @@ def test_the_table_names_what_is_missing_and_what_disagrees():
     assert "left out: MFEM" in text
 
 
-def test_a_million_designs_on_paper():
-    import scale
+def test_a_simulated_study_is_bound_by_what_is_slowest_and_loses_nothing():
+    from scheduler import Costs, simulate
 
-    one = {"read_and_check_ms": 3.6, "append_ms": 0.36, "sent_bytes": 8000.0, "serial_ms": 720.0}
-    paper = scale.on_paper(one, [{"overhead_ms_a_row": 4.0}, {"overhead_ms_a_row": 7.2}])
-    assert paper["client_read_and_check_h"] == pytest.approx(1.0)
-    assert paper["scheduler_and_wire_h"] == pytest.approx(4.0 / 3.6)
-    assert paper["client_memory_of_tasks_GB"] == pytest.approx(8.0)
-    assert paper["workers_carried"] == pytest.approx(180.0)
+    costs = Costs(solve=0.7, spread=0.2, read=0.001, dispatch=0.004, write=0.0002, begin=10.0)
+    few, many = simulate(4000, 10, costs), simulate(4000, 2000, costs)
+    assert few.seconds == pytest.approx(280.0 + 10.0, rel=0.05)
+    # the scheduler serves one after the other
+    assert 16.0 <= many.seconds < 16.0 + 10.0 + 8.0
+    assert few.busy > 0.9 > 0.2 > many.busy
+    dying = simulate(4000, 10, costs, lives_h=0.05)
+    assert dying.repeated > 5
+    assert dying.seconds * dying.busy * 10 == pytest.approx(few.seconds * few.busy * 10, rel=0.02)
+    # one process reads and checks designs, unless there are more
+    slow = simulate(4000, 100, Costs(0.1, 0.0, 0.1, 0.001, 0.0, 0.0))
+    assert slow.seconds == pytest.approx(400.0, rel=0.01)
+    assert simulate(4000, 100, Costs(0.1, 0.0, 0.1, 0.001, 0.0, 0.0), readers=8).seconds < 60.0
 
 
 def test_another_numbering_changes_no_temperature():
