@@ -206,7 +206,7 @@ class BearingMechanics:
         for group in spec.bearing_set:
             mounted = assembled_set(spec, group)
             if group.name in elastic:
-                mounted = replace(mounted, seats=elastic[group.name])
+                mounted = replace(mounted, seats=elastic[group.name], recent={})
             self.sets[group.name] = mounted
         self.radial_loads = radial_loads(spec)
 

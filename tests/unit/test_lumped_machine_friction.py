@@ -27,6 +27,12 @@ def friction_machine():
     return build_machine_network(spec), OperatingPoint.of(spec), heat_model_of(spec)
 
 
+@pytest.fixture(scope="module")
+def networked():
+    spec = load_machine("wu_tan_2016")
+    return build_machine_network(spec), OperatingPoint.of(spec)
+
+
 def test_jacobian_of_friction_and_contacts_is_the_derivative(friction_machine):
     network, point, model = friction_machine
     state = solve_machine_network(network, point, heat_model=model)
@@ -106,3 +112,28 @@ def test_network_says_at_which_speed_equilibria_fold():
     assert solve_machine_network(network, below).imbalance_relative < 1e-10
     with pytest.raises(NoSteadyStateError, match="a fold at"):
         solve_machine_network(network, replace(point, speed=1.02 * limit * np.pi / 30.0))
+
+
+def test_searches_from_the_last_equilibrium_find_what_those_from_rest_find(networked, monkeypatch):
+    network, point = networked
+    around = {
+        kelvin: {
+            name: BearingTemperatures(
+                kelvin + 4.0, kelvin, kelvin + 3.0, kelvin + 4.0, kelvin, network.growth.shifts(field)[name]
+            )
+            for name in network.ball_nodes
+        }
+        for kelvin, field in ((k, np.full(network.n_solid, k)) for k in (300.0, 301.5))
+    }
+    again, fresh = network_heat_model(network), network_heat_model(network)
+    again(point, around[300.0])
+    expected = fresh(point, around[301.5])[0]
+
+    def refuse(*_, **__):
+        raise AssertionError("a search from rest")
+
+    monkeypatch.setattr("spindle_fem.physics.bearings.bearing_set.solve_equilibrium", refuse)
+    found = again(point, around[301.5])[0]
+    for name, heat in expected.items():
+        assert found[name].total == pytest.approx(heat.total, rel=1e-8)
+        assert found[name].preload == pytest.approx(heat.preload, rel=1e-7)

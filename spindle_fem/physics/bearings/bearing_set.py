@@ -13,7 +13,12 @@ from spindle_fem.errors import NoEquilibriumError, SpecError
 from spindle_fem.physics.bearings.ball_system import BallSystem
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_state import BearingState
-from spindle_fem.physics.bearings.equilibrium import Equilibrium, RacewayControl, solve_equilibrium
+from spindle_fem.physics.bearings.equilibrium import (
+    Equilibrium,
+    RacewayControl,
+    equilibrium_near,
+    solve_equilibrium,
+)
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.mounting import (
@@ -41,6 +46,8 @@ from spindle_fem.physics.bearings.traction import LubricantState, TractionOption
 from spindle_fem.validity import CodedWarning
 
 FloatArray = NDArray[np.float64]
+# Of the speed: how far another equilibrium may be to begin from it.
+_NEAR_SPEED = 0.05
 # Cage slip from which a bearing is said to slide
 _GROSS_SLIP = 0.1
 
@@ -320,12 +327,25 @@ def _solve(
             where, "a turning bearing without load or preload has no equilibrium: nothing seats its balls.",
             "Give an axial load or a preload.",
         )  # fmt: skip
-    start = np.concatenate([start_displacement(problem, where) for problem in problems])
     load = np.concatenate([problem.load for problem in problems])
-    return solve_equilibrium(
+    recent = problems[0].bearing_set.recent if control == "equilibrium" and speed > 0.0 else None
+    key = system.number, len(load)
+    if recent is not None and key in recent:
+        at, before = recent[key]
+        if abs(speed - at) <= _NEAR_SPEED * speed:
+            before = replace(before, ball_speeds=before.ball_speeds * (speed / at))
+            near = equilibrium_near(system, speed, load, before, ball_load, film, options)
+            if near is not None:
+                recent[key] = speed, near
+                return near
+    start = np.concatenate([start_displacement(problem, where) for problem in problems])
+    solved = solve_equilibrium(
         system, speed, load, control, at_rest=(start, ball_load), lubricant=film, options=options,
         where=where,
     )  # fmt: skip
+    if recent is not None:
+        recent[key] = speed, solved
+    return solved
 
 
 __all__ = [

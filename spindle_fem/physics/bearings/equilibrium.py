@@ -38,6 +38,8 @@ _SMOOTHINGS = (2e-6, 3e-7, 5e-8, 1e-8, 1e-9, 1e-10, 1e-11, 0.0)
 _CREEP_RATIOS = (2e-2, 3e-3, 5e-4)
 # A ball counts as free below this share of the ball load of preload and thrust
 _FREE_LOAD = 1e-3
+# Newton steps within which an equilibrium is next to another.
+_NEAR = 12
 # A ball is left to the cage below this multiple of the traction it needs
 _DRIVE_MARGIN = 2.0
 
@@ -124,6 +126,39 @@ def solve_equilibrium(
     if not attempt.converged:
         attempt = _continue_in_speed(solver, magnitude, centre, rest.displacement, where)
     return solver.finish(attempt.solution, magnitude, attempt.carried)
+
+
+def equilibrium_near(
+    system: BallSystem,
+    speed: float,
+    load: FloatArray,
+    before: Equilibrium,
+    ball_load: float,
+    lubricant: LubricantState,
+    options: TractionOptions,
+) -> Equilibrium | None:
+    """Equilibrium by friction next to one of the same balls under almost the same conditions.
+
+    Parameters as of :func:`solve_equilibrium`; ``ball_load`` in N.
+
+    Returns
+    -------
+    Equilibrium or None
+        None where a few Newton steps do not lead there, or where other balls come free of their inner
+        race: the way from rest decides then.
+    """
+    solver = _Solver(system, load, "equilibrium", ball_load, lubricant, options)
+    free = solver._free_balls(before.centre, before.displacement)
+    if np.any(before.carried != free):
+        return None
+    guess = np.column_stack([before.centre, before.ball_speeds])
+    rows = solver._forces(speed)
+    solution = solver._frictional(speed, guess, before.displacement, rows, options, free)
+    if not solution.converged or solution.iterations > _NEAR:
+        return None
+    if np.any(solver._free_balls(solution.unknowns[:, :2], solution.displacement) != free):
+        return None
+    return solver.finish(solution, speed, free)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

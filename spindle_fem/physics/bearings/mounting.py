@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,9 @@ class BearingSet:
         Composite moments from measured profiles; None: assumed from both Rq.
     seats : SeatBodies or None
         Elastic bodies that carry the rings, in place of the cylinders of each bearing's ``fits``.
+    recent : dict or None
+        Filled with the last equilibria and their speeds, from which the next search begins; None: each
+        search begins at rest.
 
     Raises
     ------
@@ -91,6 +94,7 @@ class BearingSet:
     ball_roughness: float = 0.01e-6
     roughness: SurfaceRoughness | None = None
     seats: SeatBodies | None = None
+    recent: dict[tuple, Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.bearings:
@@ -122,7 +126,7 @@ class BearingSet:
     def with_rigid_rings(self) -> BearingSet:
         """The set with rings that keep their size: the contact angle is that of the mounted bearing."""
         bearings = tuple(replace(bearing, fits=None) for bearing in self.bearings)
-        return replace(self, bearings=bearings, seats=None)
+        return replace(self, bearings=bearings, seats=None, recent=None)
 
     def assembly_approaches(self) -> FloatArray:
         """Axial approach of each bearing after assembly, (n_bearings,), m.
