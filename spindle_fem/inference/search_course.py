@@ -11,7 +11,7 @@ from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search
 from spindle_fem.inference.neighbouring_sets import exchanged, reduced, widened
-from spindle_fem.inference.state_search import add_states, settle_best
+from spindle_fem.inference.state_search import WORTH_ANOTHER, add_states, settle_best
 from spindle_fem.inference.step_search import add_steps
 
 
@@ -75,7 +75,9 @@ def _beside(search: Search) -> None:
     once the other is known.
     """
     best = search.ranked()[0]
-    while 0 < len(best.keys) < LARGEST_SET and not search.is_explained(best):
+    for _ in range(LARGEST_SET):
+        if not 0 < len(best.keys) < LARGEST_SET or search.is_explained(best):
+            return
         search.progress("diagnosis: beside the best set")
         if not any(search.is_hidden_state(c) for c in best.fit.candidates):
             laws = [h.fit for h in search.ranked() if _only_laws(search, h)]
@@ -83,9 +85,11 @@ def _beside(search: Search) -> None:
         screened, intervals = search.screened(best.fit)
         search.extend(best.fit, screened, intervals, 1, tuned.ADDITIONS)
         settle_best(search)
-        if search.ranked()[0] is best:
+        again = search.ranked()[0]
+        if again.score <= best.score + WORTH_ANOTHER:
+            # A state that is followed again gains a little every time.
             return
-        best = search.ranked()[0]
+        best = again
 
 
 def _what_changes(search: Search, fit: Fit) -> None:
