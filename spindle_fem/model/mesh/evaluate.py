@@ -17,6 +17,8 @@ from spindle_fem.model.mesh.mesh_operators import ThermalOperators, prolongation
 from spindle_fem.model.mesh.skfem_mesh import tetrahedron_element
 
 CANDIDATES = 48
+# A search tree costs as much as looking at all elements for this many points.
+FEW_POINTS = 8
 NEWTON_STEPS = 30
 NEWTON_TOLERANCE = 1e-12
 # A point may lie this far outside its element, in reference coordinates,
@@ -81,8 +83,7 @@ def _locate_in(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     corners = mesh.points[mesh.tetrahedra[own, :4]]
     n_candidates = min(CANDIDATES, len(own))
-    _, near = KDTree(corners.mean(axis=1)).query(asked, k=n_candidates)
-    candidates = own[np.reshape(near, (len(asked), n_candidates))]
+    candidates = own[_nearest(corners.mean(axis=1), asked, n_candidates)]
     nodes = mesh.points[mesh.tetrahedra[candidates.ravel()]]
     targets = np.repeat(asked, n_candidates, axis=0)
     places = _invert_mapping(nodes, targets)
@@ -103,6 +104,18 @@ def _locate_in(
             "Move the point into the part or name another part.",
         )
     return chosen, chosen_places, np.maximum(excess, 0.0) * extent
+
+
+def _nearest(centres: NDArray[np.float64], asked: NDArray[np.float64], number: int) -> NDArray[np.int64]:
+    """Centres nearest to each point, (len(asked), number), the nearest first."""
+    if len(asked) > FEW_POINTS:
+        return np.reshape(KDTree(centres).query(asked, k=number)[1], (len(asked), number))
+    found = np.empty((len(asked), number), dtype=np.int64)
+    for row, point in enumerate(asked):
+        squared = np.sum((centres - point) ** 2, axis=1)
+        near = np.argpartition(squared, number - 1)[:number]
+        found[row] = near[np.argsort(squared[near], kind="stable")]
+    return found
 
 
 def _outside(places: NDArray[np.float64]) -> NDArray[np.float64]:

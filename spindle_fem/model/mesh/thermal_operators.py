@@ -273,7 +273,10 @@ class ThermalOperators:
         self, rows: slice, values: NDArray[np.float64], nodes: NDArray[np.int64]
     ) -> sparse.csr_array:
         i, j = upper_pairs(nodes.shape[1])
-        entries = values[:, None] * self.facet_film[rows]
+        # One cell of a channel is a small part of its wall.
+        active = np.flatnonzero(values)
+        nodes = nodes[active]
+        entries = values[active, None] * self.facet_film[rows][active]
         off = i != j
         return sparse.coo_array(
             (
