@@ -109,13 +109,23 @@ class Answer:
     slopes: Array
 
 
-def answer(predictor: Predictor, fit: Fit, trial: Trial, places: Sequence[Place], spacing: float) -> Answer:
+def answer(
+    predictor: Predictor,
+    fit: Fit,
+    trial: Trial,
+    places: Sequence[Place],
+    spacing: float,
+    known: list[Array] | None = None,
+) -> Answer:
     """Simulate a trial under a hypothesis.
 
     Parameters
     ----------
     spacing : float, [s]
         Interval between the instants of the readings.
+    known : list of ndarray, optional
+        What directions do in this trial to channels and places, as another hypothesis left it here; filled
+        where it is empty. They do nearly the same under all hypotheses that fit the same readings.
 
     Raises
     ------
@@ -134,9 +144,11 @@ def answer(predictor: Predictor, fit: Fit, trial: Trial, places: Sequence[Place]
         slopes.append(told.slopes_at(means))
     directions = [item for item in predictor.misdescribed if item.coordinate in values]
     if directions:
-        changes = list(direction_columns(BaseRun(own, 0, values, fit.candidates), directions))
-        if places:
-            changes[1] = np.einsum("pr,grn->gpn", means, changes[1], optimize=True)
+        changes = [] if known is None else known
+        if not changes:
+            changes += direction_columns(BaseRun(own, 0, values, fit.candidates), directions)
+            if places:
+                changes[1] = np.einsum("pr,grn->gpn", means, changes[1], optimize=True)
         amounts = np.array([values[item.coordinate] for item in directions])
         rows = [names.index(item.coordinate) for item in directions]
         for reading, slope, change in zip(readings, slopes, changes, strict=False):

@@ -214,7 +214,8 @@ def evaluate(
         duration = float(trial.drive.grid[-1] - trial.drive.grid[0])
         spacing = max(min(SPACING, duration / FEWEST_INSTANTS), duration / MOST_INSTANTS)
         try:
-            answers = [answer(predictor, fit, trial, places, spacing) for fit in fits]
+            known: list[Array] = []
+            answers = [answer(predictor, fit, trial, places, spacing, known) for fit in fits]
         except (ConvergenceError, OutOfValidityError, SpecError) as error:
             failed.append({"condition": trial.name, "reason": str(error)})
             continue
