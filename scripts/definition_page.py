@@ -124,7 +124,7 @@ was taken (`assumed`).
 - what is left is adiabatic.
 
 An entry of the file with the name of such a one replaces the values that it gives. `check` lists every
-one; contacts of what turns with what stands have no rule. `geometry/motor_spindle.toml`,
+one; contacts between rotating and stationary parts have no rule. `geometry/motor_spindle.toml`,
 `belt_lathe.toml` and `router_spindle.toml` are written this way, and so is what `spindle-fem new` writes.
 
 ## Contacts and surfaces

@@ -140,7 +140,8 @@ def check_machine(
         "parts": [
             {
                 "name": part.name,
-                "detail": f"{'rotating, ' if part.rotating else ''}{len(part.segments)} segments",
+                "detail": f"{'rotating, ' if part.rotating else ''}{len(part.segments)} "
+                f"segment{'s' * (len(part.segments) > 1)}",
             }
             for part in assembly.parts
         ],

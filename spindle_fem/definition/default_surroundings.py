@@ -26,8 +26,8 @@ _RIM = -2
 _JOINTS = {
     "workshop_inner_seats": ("10000 W/m**2/K", 0.3, "inner rings shrunk on"),
     "workshop_outer_seats": ("4000 W/m**2/K", 0.4, "outer rings with some µm of clearance"),
-    "workshop_turning_seats": ("8000 W/m**2/K", 0.3, "what turns, pressed on"),
-    "workshop_standing_seats": ("4000 W/m**2/K", 0.4, "what stands, with some µm of clearance"),
+    "workshop_turning_seats": ("8000 W/m**2/K", 0.3, "rotating parts, press fit"),
+    "workshop_standing_seats": ("4000 W/m**2/K", 0.4, "stationary parts, some µm of clearance"),
     "workshop_clamped_faces": ("8000 W/m**2/K", 0.3, "clamped ground faces"),
 }
 

@@ -20,7 +20,7 @@ from spindle_fem.report.machine_drawing import machine_drawing, part_colours
 from spindle_fem.report.meridian_axes import MM, box, meridian_axes
 
 FAULT_COLOUR = "#c1121f"
-WIDTH, MARGIN, TOP, LINE, LETTERS, FOOT, LEAST_HEIGHT = 1600.0, 94.0, 120.0, 30.0, 150, 130.0, 200.0
+WIDTH, MARGIN, TOP, LINE, LETTERS, FOOT, LEAST_HEIGHT = 1600.0, 94.0, 120.0, 30.0, 138, 130.0, 200.0
 Box = tuple[tuple[float, float], tuple[float, float]]
 
 

@@ -134,7 +134,7 @@ def radial_profiles(result: ThermalResult, section: MeridianSection) -> Figure |
         Rectangle((0, 0), 1, 1, color=BALLS),
         Rectangle((0, 0), 1, 1, color=kinds["standing"]),
     ]
-    _legend(figure, handles, ["turning parts", result.spec.rolling_elements, "standing parts"])
+    _legend(figure, handles, ["rotating parts", result.spec.rolling_elements, "stationary parts"])
     set_title(
         figure,
         "Radial profiles through the bearings",

@@ -61,7 +61,8 @@ _MARKS_TEXT = Text(
 )
 _LIMITS = (
     "Steady state of one operating point; loads, speed and surroundings constant.",
-    "Turning parts have one temperature all round in the time mean; standing parts are three-dimensional.",
+    "Rotating parts have one temperature around the axis, the mean over a turn; "
+    "stationary parts are three-dimensional.",
     "Joints have the constant conductance of the definition, the least certain input of such a model; "
     "seats that close or open with temperature are not followed unless the definition says so.",
     "The balls or rollers of a bearing are one body with one temperature; they meet the races through the "

@@ -89,7 +89,7 @@ class MeridianMap:
                     f'part "{names[second]}"',
                     f"z {in_millimetres(z_start)} to {in_millimetres(z_end)}, r {in_millimetres(inner)} to "
                     f'{in_millimetres(outer)} overlaps part "{names[first]}".',
-                    "Allowed: parts that touch or keep apart.",
+                    "Parts may touch but not overlap.",
                 )
             )
         return cls(names, z_lines, r_lines, owner)
