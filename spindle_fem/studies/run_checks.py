@@ -60,7 +60,7 @@ def check_coldest(coldest_inside: float, coldest_outside: float) -> Check:
 
 
 def check_lubricant(word: str, temperatures: dict[str, float], limit: float) -> Check:
-    """Grease or oil stays below its limit; ``temperatures`` is the warmer raceway of each bearing, K."""
+    """The lubricant stays below its limit; ``temperatures`` is the warmer raceway of each bearing, K."""
     hottest = max(temperatures, key=temperatures.get)
     return _within(
         f"{word} temperature",

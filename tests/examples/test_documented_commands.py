@@ -20,7 +20,10 @@ OF_THIS_PROGRAM = {page: [c for c in documented(page) if c.words[0] == "spindle-
 SHORT = [page for page in PAGES if any(not c.is_mention for c in OF_THIS_PROGRAM[page])]
 # Their blocks have tests of their own, which look at the answers.
 OWN_PYTHON_TESTS = {"README.md", "python.md"}
-WITH_PYTHON = [page for page in PAGES if blocks_of(page, "python") and page.name not in OWN_PYTHON_TESTS]
+# Recipes for Slurm and Kubernetes.
+NEEDS_A_CLUSTER = {"scale.md"}
+WITHOUT_TEST_HERE = OWN_PYTHON_TESTS | NEEDS_A_CLUSTER
+WITH_PYTHON = [page for page in PAGES if blocks_of(page, "python") and page.name not in WITHOUT_TEST_HERE]
 
 
 def named(page):

@@ -10,12 +10,7 @@ import pytest
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.framework.term import Term, TermParameter
-from spindle_fem.errors import (
-    EnergyBalanceError,
-    NoSteadyStateError,
-    RecordingError,
-    SpecError,
-)
+from spindle_fem.errors import EnergyBalanceError, NoSteadyStateError, RecordingError, SpecError
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.input_samples import InputHistory
@@ -42,9 +37,10 @@ RPM = np.pi / 30.0
 
 
 def held(times, **inputs):
-    names = tuple(inputs)
-    values = np.column_stack([np.broadcast_to(np.asarray(inputs[name], float), len(times)) for name in names])
-    return InputHistory(np.asarray(times, float), names, values, np.ones(len(names), dtype=bool))
+    values = np.column_stack(
+        [np.broadcast_to(np.asarray(value, float), len(times)) for value in inputs.values()]
+    )
+    return InputHistory(np.asarray(times, float), tuple(inputs), values, np.ones(len(inputs), dtype=bool))
 
 
 def lines(times, **inputs):
@@ -116,14 +112,14 @@ def test_energies_add_up():
 
 
 # ------------------------------------------------------------- steady state
-@pytest.mark.slow
 def test_steady_state_stays(paper_machine, steady):
-    """Started from the coupled steady state nothing moves."""
+    """Started from the coupled steady state nothing moves, and steps grow by four each time."""
     start = start_from(solve_coupled(paper_machine, OperatingPoint.of(paper_machine.spec)))
     run = simulate_full(paper_machine, held([0.0, 7200.0], speed=3000 * RPM, thrust=1750.0), start=start)
     expected = [steady.probes[name] for name in run.probes]
     assert np.abs(run.readings - expected).max() < 1e-5
     assert run.steps.bearing_heat[-1].sum() == pytest.approx(steady.energy.heat_in, rel=1e-6)
+    assert run.counts["evaluations"] < 100
 
 
 @pytest.mark.slow
@@ -154,10 +150,18 @@ def test_nothing_gets_colder_than_the_coolant(heat_up):
 
 
 @pytest.mark.slow
-def test_friction_falls_as_the_grease_warms(heat_up):
-    heat, warm = heat_up.steps.bearing_heat.sum(axis=1), heat_up.steps.times > 600.0
+def test_friction_falls_as_the_grease_warms(machine):
+    """Bearings of the size of assembly: no preload grows against it."""
+    run = simulate_full(machine, held([0.0, 14400.0], speed=3000 * RPM, thrust=1750.0))
+    heat, warm = run.steps.bearing_heat.sum(axis=1), run.steps.times > 600.0
     assert heat.max() > 1.1 * heat[-1]
     assert np.all(np.diff(heat[warm]) < 0.0)
+
+
+@pytest.mark.slow
+def test_preload_raises_friction_against_the_warming_grease(heat_up):
+    heat = heat_up.steps.bearing_heat.sum(axis=1)
+    assert heat[-1] > 1.1 * heat[heat_up.steps.times < 600.0].max()
 
 
 # --------------------------------------------------------------------- steps

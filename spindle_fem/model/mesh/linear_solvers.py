@@ -185,8 +185,10 @@ def solve_linear(
         estimate = largest(first)
         wanted = max(error_tolerance, floor, reduction * estimate)
         if estimate <= wanted:
-            unknowns += first
-            return LinearSolution(unknowns, 0, np.nan)
+            # as far along it as helps: all of it would overshoot where the preconditioner is of another step
+            state = _Iteration(matrix, residual)
+            state.advance(first)
+            return LinearSolution(unknowns + state.unknowns, 0, np.nan)
         correction, iterations, reached = _to_error(
             matrix, residual, preconditioner.apply, first, wanted, max_iterations
         )
@@ -236,7 +238,7 @@ def _to_error(
         preconditioned = precondition(state.residual)
         reached = largest(preconditioned)
         if reached <= wanted:
-            state.unknowns += preconditioned
+            state.advance(preconditioned)
             return state.unknowns, iteration, reached
     return state.unknowns, limit, reached
 

@@ -37,6 +37,9 @@ REDUCTION = 0.02
 # A preconditioner of other coefficients or steps serves until it takes so many times the iterations
 # that it took when new for the same decades of error.
 STALE_FACTOR = 1.6
+# Nor does it serve for steps so many times longer or shorter, whatever it takes: one that is made for a
+# short step nearly weighs storage alone.
+OTHER_STEP = 10.0
 # Share of a change that the next iteration of a stage leaves, while nothing is known of it.
 UNKNOWN_CONTRACTION = 1.0
 # A contraction that is better than before is believed only so far.
@@ -77,6 +80,7 @@ class _Kept:
     matrix: sparse.csr_array | None = None
     row_sums: NDArray[np.float64] | None = None
     preconditioner: Preconditioner | None = None
+    preconditioned_step: float = -1.0
     fresh_effort: float | None = None
     stale: bool = False
     slope: NDArray[np.float64] | None = None
@@ -339,7 +343,8 @@ class StageSolver:
             kept.row_sums = kept.matrix @ np.ones(kept.matrix.shape[0])
             kept.step = size
             self.matrix_builds += 1
-            if kept.preconditioner is None or kept.stale:
+            ratio = size / kept.preconditioned_step
+            if kept.preconditioner is None or kept.stale or not 1.0 / OTHER_STEP < ratio < OTHER_STEP:
                 tied = kept.tied
                 stepped = ThermalSystem(
                     add_scaled(self._tied_storage, factor, tied.matrix),
@@ -352,6 +357,7 @@ class StageSolver:
                     tied.prolongation,
                 )
                 kept.preconditioner = build_preconditioner(stepped, self._control.method)
+                kept.preconditioned_step = size
                 self.preconditioner_builds += 1
                 kept.fresh_effort = None
                 kept.stale = False

@@ -175,7 +175,7 @@ def angle_of_clearance(
     Source: Harris & Kotzalas, vol. 1: cos α = 1 - P_d / (2 A).
 
     >>> round(math.degrees(angle_of_clearance(15e-6, 12.7e-3, 0.52, 0.52)), 2)
-    9.85
+    9.86
     """
     distance = (groove_curvature_inner + groove_curvature_outer - 1.0) * ball_diameter
     return math.acos(max(1.0 - clearance / (2.0 * distance), -1.0))

@@ -27,7 +27,7 @@ def nusselt_schnabel(reynolds: Array, prandtl: Array, entry: Array) -> Array:
     laminar, transitional and turbulent film. Smooth vertical wall; its range is assumed here.
 
     >>> float(nusselt_schnabel(400.0, 7.0, 1.0e-3).round(3))
-    0.292
+    0.339
     """
     laminar = 1.3 * np.cbrt(1.0 / reynolds)
     entering = 0.912 * np.cbrt(np.cbrt(reynolds) * prandtl * entry)

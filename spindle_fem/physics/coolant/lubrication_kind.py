@@ -124,7 +124,8 @@ def _parker(stream: BearingStream) -> float:
     return float(path_fill_parker(flow, stream.rpm, pitch, extrapolate=True))
 
 
-@correlation(prandtl=(0.5, 1.0e4))
+# Balls and rollers are smaller than half the pitch diameter.
+@correlation(prandtl=(0.5, 1.0e4), relative_size=(0.0, 0.5))
 def film_harris(
     speed: Array,
     kinematic_viscosity: Array,
