@@ -5,7 +5,7 @@
 Each repeat is a process of its own with an empty mesh cache, or with --cached
 one that has the mesh; the table shows the fastest repeat and the share of each
 stage, and what the whole process took on the wall and of processor, those that
-it started included. Stages "beside" ran in these. Numbers of different
+it started included. Stages "in parallel" ran in these. Numbers of different
 machines compare as ratios only.
 """
 

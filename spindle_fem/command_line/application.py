@@ -37,6 +37,14 @@ ORDER = (
 )
 
 
+def _without_values(options: list[Any]) -> list[Any]:
+    """The same options; the help would list plain flags as if they took a value, ``<bool>``."""
+    for option in options:
+        if getattr(option, "is_flag", False) and option.metavar is None:
+            option.metavar = ""
+    return options
+
+
 class _Commands(TyperGroup):
     """The commands; ``diagnose --plan`` and ``diagnose --jobs`` are commands of their own."""
 
@@ -45,6 +53,18 @@ class _Commands(TyperGroup):
         return sorted(
             super().list_commands(ctx), key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER)
         )
+
+    def get_params(self, ctx: typer.Context) -> list[Any]:
+        """Options of the application; its flags take no value."""
+        return _without_values(super().get_params(ctx))
+
+    def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:
+        """Command of a name; its flags, and those of its own commands, take no value."""
+        command = super().get_command(ctx, cmd_name)
+        if command is not None:
+            for each in (command, *getattr(command, "commands", {}).values()):
+                _without_values(each.get_params(ctx))
+        return command
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:
         """Arguments with those that every command takes first, wherever they stand."""

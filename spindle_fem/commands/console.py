@@ -35,7 +35,7 @@ def _print_marked(console: Console, mark: str, text: str, style: str) -> None:
 
 def _print_warnings(console: Console, content: dict[str, Any]) -> None:
     """Print assumptions completed by rule, and warnings."""
-    for row in content.get("assumed", ()):
+    for row in sorted(content.get("assumed", ()), key=lambda row: row["name"].partition(".")[0]):
         _print_marked(console, "assumed", f" {row['name']}: {row['detail']}", "bold")
     for warning in content["warnings"]:
         _print_marked(console, warning["code"], f": {warning['text']}", "yellow")
@@ -101,7 +101,7 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
         f"{mesh['nodes']:,} temperatures, {mesh['elements']:,} elements, "
         f"worst quality {mesh['min_quality']:.2f}"
     )
-    split = ", ".join(f"{name} {seconds:.1f}" for name, seconds in summary["timings_s"].items())
+    split = _time_split(summary["timings_s"])
     console.print(f"{summary['wall_time_s']:.1f} s ({split}), peak {summary['peak_rss_MB']:.0f} MB")
     for check in summary["checks"]:
         if not check["passed"]:
@@ -116,9 +116,19 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
     console.print(f"Report: {folder / 'report.html'}")
 
 
+def _time_split(times: Mapping[str, float]) -> str:
+    """Seconds of each step; those that ran in parallel are listed once, after the others."""
+    mark = "in parallel: "
+    after_another = [f"{name} {time:.1f}" for name, time in times.items() if not name.startswith(mark)]
+    parallel = [f"{name[len(mark) :]} {time:.1f}" for name, time in times.items() if name.startswith(mark)]
+    return ", ".join(after_another) + (f"; {mark}{', '.join(parallel)}" if parallel else "")
+
+
 def print_check(content: dict[str, Any], picture: Path | None = None) -> None:
     """Operation, parts, surfaces, contacts, probes and sources of a valid machine, and its picture."""
     console = open_console()
+    drawn = "." if picture is None else f", drawn in {picture}."
+    _print_marked(console, content["machine"], f" is valid{drawn}", "bold")
     lists = [key for key, rows in content.items() if isinstance(rows, list)]
     for key in (key for key in lists if key not in ("assumed", "warnings")):
         if not content[key]:
@@ -129,7 +139,6 @@ def print_check(content: dict[str, Any], picture: Path | None = None) -> None:
             table.add_row(row["name"], row.get("detail", ""))
         console.print(table)
     _print_warnings(console, content)
-    drawn = "." if picture is None else f", drawn in {picture}."
     _print_marked(console, content["machine"], f" is valid{drawn}", "bold")
 
 

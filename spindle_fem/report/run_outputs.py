@@ -93,7 +93,7 @@ class OutputHelpers:
 
     def wait(self) -> dict[str, float]:
         """Wait for all that was begun; seconds of each part."""
-        return {f"beside: {name}": answer() for name, answer in self._waiting.items()}
+        return {f"in parallel: {name}": answer() for name, answer in self._waiting.items()}
 
     def write_report(self, summary: dict[str, Any]) -> None:
         """Write the page of the result begun."""
@@ -129,7 +129,7 @@ def write_outputs(
     Returns
     -------
     dict of str to float, [s]
-        Time of each step, also in ``summary.json``. Steps ``beside: ...`` ran
+        Time of each step, also in ``summary.json``. Steps ``in parallel: ...`` ran
         in other processes; ``pictures`` is what was waited for them.
     """
     if helpers is None:

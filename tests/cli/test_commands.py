@@ -145,3 +145,10 @@ def test_bearing_file_gives_the_published_state(command, tmp_path):
 def test_help_and_version(process):
     assert "run" in process("--help").stdout
     assert process("--version").stdout.startswith("spindle-fem ")
+
+
+@pytest.mark.parametrize("command_line", [(), ("check",), ("recording", "draft")])
+def test_flags_are_not_listed_as_if_they_took_a_value(process, command_line):
+    shown = process(*command_line, "--help").stdout
+    assert "--help" in shown
+    assert "bool" not in shown

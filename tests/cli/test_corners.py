@@ -70,6 +70,14 @@ def test_brackets_of_texts_reach_the_terminal(capsys):
         assert text in shown
 
 
+def test_check_opens_and_ends_with_its_verdict_and_keeps_the_assumed_of_a_table_together(capsys):
+    assumed = [{"name": name, "detail": "a rule"} for name in ("gap.a", "joint.b", "gap.c")]
+    print_check({"machine": "made", "assumed": assumed, "warnings": []})
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == lines[-1] == "made is valid."
+    assert [line.split()[1] for line in lines[1:-1]] == ["gap.a:", "gap.c:", "joint.b:"]
+
+
 def test_a_sweep_names_its_best_design_in_customary_units(capsys):
     content = {
         "parameters": [{"path": "channel.depth", "unit": "m"}],

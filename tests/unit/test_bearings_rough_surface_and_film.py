@@ -65,5 +65,5 @@ def test_film_fit_warning_names_what_is_outside() -> None:
     assert film_fit_warnings(1e-11, 4000.0, 5.0) == ()
     (warning,) = film_fit_warnings(2e-10, 4000.0, 8.6)
     assert warning.code == "film_fit_extrapolated"
-    assert "U is 2e-10" in warning.text
-    assert "ellipticity is 8.6" in warning.text
+    assert "speed parameter U is 2e-10" in warning.text
+    assert "ellipticity of the contact is 8.6" in warning.text

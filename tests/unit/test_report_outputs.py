@@ -209,7 +209,10 @@ def run_folder(result, tmp_path_factory):
     with output_folder(tmp_path_factory.mktemp("runs") / "run") as folder:
         times = write_outputs(result, folder, notify=steps.append)
     assert steps == ["fields", "pictures", "report"]
-    assert list(times) == [*steps, *(f"beside: {what}" for what in ("pictures", "data", "growth", "charts"))]
+    assert list(times) == [
+        *steps,
+        *(f"in parallel: {what}" for what in ("pictures", "data", "growth", "charts")),
+    ]
     return folder
 
 

@@ -76,9 +76,9 @@ def film_fit_warnings(
 ) -> tuple[CodedWarning, ...]:
     """Warning where a film lies outside the range of Hamrock and Dowson's fit."""
     faults = [
-        range_fault("U", speed_group, 1e-12, 5e-11),
-        range_fault("G", material_group, 2500.0, 6000.0),
-        range_fault("ellipticity", ellipticity, 1.0, 8.0),
+        range_fault("speed parameter U", speed_group, 1e-12, 5e-11),
+        range_fault("material parameter G", material_group, 2500.0, 6000.0),
+        range_fault("ellipticity of the contact", ellipticity, 1.0, 8.0),
     ]
     text = "; ".join(fault for fault in faults if fault)
     if not text:

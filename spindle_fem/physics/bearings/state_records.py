@@ -345,7 +345,7 @@ def _control_doubts(
     if slips.any():
         reasons.append(f"the {'inner' if control == 'outer' else 'outer'} raceway resists spin more")
     if gyrates.any():
-        reasons.append("the gyroscopic moment asks for a friction coefficient above 0.02")
+        reasons.append("the gyroscopic moment would need a friction coefficient above 0.02")
     if not reasons:
         return []
     return [
