@@ -52,20 +52,21 @@ _BALL = re.compile(r"(719|70|72)(\d\d)[ _]?(C|E|AC)([ _/]?HC)?", re.ASCII)
 _GROOVE = re.compile(r"(60|62)(\d\d)([ _/]?HC)?", re.ASCII)
 _ROLLERS = re.compile(r"(NN30|N10)(\d\d)(?:[ _]?K)?([ _/]?HC)?", re.ASCII)
 RULE = (
-    "boundary dimensions of ISO 15; the largest ball of whole 1/32 in within 0.60 (719) or 0.635 (70, 72) "
-    "of the section, on 0.85 of the pitch circle; shoulders 0.6 ball diameters from it; grooves of 0.52"
+    "boundary dimensions of ISO 15; ball diameter the largest multiple of 1/32 inch of at most 0.60 "
+    "(series 719) or 0.635 (series 70, 72) of the section's height, as many balls as fill 0.85 of the "
+    "pitch circle; shoulders 0.6 ball diameters from the pitch circle; groove radii of 0.52 ball diameters"
 )
 
 GROOVE_RULE = (
-    "boundary dimensions of ISO 15; the largest ball of whole 1/32 in within 0.60 of the section, as many as "
-    "fill an arc of 195 degrees and one more; shoulders 0.6 ball diameters from the pitch circle; grooves of "
-    "0.52; 10 µm of clearance as mounted"
+    "boundary dimensions of ISO 15; ball diameter the largest multiple of 1/32 inch of at most 0.60 of "
+    "the section's height, as many balls as fill an arc of 195 degrees and one more; shoulders 0.6 ball "
+    "diameters from the pitch circle; groove radii of 0.52 ball diameters; 10 µm of clearance as mounted"
 )
 
 ROLLER_RULE = (
     "boundary dimensions of ISO 15; the outer raceway a quarter of the section's height inside the outside "
-    "diameter; rollers of whole millimetres nearest to 0.45 of the section, as long as thick, 0.9 of it "
-    "bearing, on 0.85 of the pitch circle; no clearance as mounted"
+    "diameter; rollers of whole millimetres nearest to 0.45 of the section's height, as long as thick, 0.9 "
+    "of that length bearing, as many as fill 0.85 of the pitch circle; no clearance as mounted"
 )
 
 # N/mm² of the pitch circle's square: heavy preload of a pair with 15 and with 25 degrees, by series.
@@ -73,8 +74,8 @@ _HEAVY_PRELOAD = {"719": (0.112, 0.158), "70": (0.1585, 0.215), "72": (0.208, 0.
 PRELOAD_CLASSES = {"light": 1.0 / 4.5, "medium": 0.5, "heavy": 1.0}
 PRELOAD_RULE = (
     "heavy: 0.112, 0.1585, 0.208 N/mm² (C), 0.158, 0.215, 0.284 N/mm² (E, AC) of the pitch diameter squared "
-    "for 719, 70, 72; medium half, light 1/4.5 of it, fitted to IBC TI-I-5050.0 (2010); sets by the approach "
-    "of their bearings"
+    "for 719, 70, 72; medium half, light 1/4.5 of it, fitted to IBC TI-I-5050.0 (2010); larger sets by "
+    "the force that closes them by the same distance as a pair"
 )
 
 SHIPPED = (

@@ -214,7 +214,8 @@ def _films(content: dict[str, Any], drawn: _Drawn) -> Iterator[tuple[str, str]]:
         if turns:
             law = "becker" if kind == "cylinder" else "disc"
             film |= {"kind": "rotating", "correlation": law, "diameter": size, "minimum": "10 W/m**2/K"}
-            what = f"turning {kind} of {size}: {law}, at least 10 W/(m²·K)"
+            shape = "cylinder" if kind == "cylinder" else "end face"
+            what = f"rotating {shape} of {size} diameter: {law}, at least 10 W/(m²·K)"
         else:
             law = "horizontal_cylinder" if kind == "cylinder" else "vertical_plate"
             film |= {"kind": "natural_convection_radiation", "orientation": law}
