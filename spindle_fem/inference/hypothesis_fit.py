@@ -330,7 +330,7 @@ class Problem:
                 slopes[:, index] = coordinate.sigma * straight[coordinate.name]
         cost, residual, predicted = cost_at(position, None)
         jacobian, predicted = slopes_at(position, predicted)
-        at_position, damping = True, 1e-3
+        damping = 1e-3
         for iteration in range(iterations):
             weight = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(np.abs(residual), 1e-12))
             hessian = jacobian.T @ (weight[:, None] * jacobian) + root.T @ root
@@ -359,23 +359,9 @@ class Problem:
                     trial = (np.inf, residual, None)
                 if trial[0] < cost - 1e-9:
                     gain = cost - trial[0]
-                    told = jacobian @ move
-                    missed = residual - told - trial[1]
                     position = position + move
-                    cost, residual, moved = trial
-                    turned = move[bent]
-                    at_position = not turned.any() or float(
-                        np.linalg.norm(missed)
-                    ) > tuned.SAME_SLOPES_WITHIN * float(np.linalg.norm(told))
-                    if not at_position:
-                        # Nearly straight on the way: slopes that would have told where it led (Broyden's).
-                        slopes[:, bent] += np.outer(missed, turned / (turned @ turned))
-                        predicted = [
-                            replace(new, tangents=old.tangents, columns=old.columns)
-                            for new, old in zip(moved, predicted, strict=True)
-                        ]
-                    else:
-                        jacobian, predicted = slopes_at(position, moved)
+                    cost, residual, predicted = trial
+                    jacobian, predicted = slopes_at(position, predicted)
                     damping = max(damping / 10.0, 1e-6)
                     improved = True
                     break
@@ -393,8 +379,6 @@ class Problem:
                 break
         if not np.isfinite(cost):
             raise ConvergenceError("diagnosis", "a hypothesis cannot be simulated at any of its parameters.")
-        if not at_position:
-            jacobian, _ = slopes_at(position, predicted)
         weight = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(np.abs(residual), 1e-12))
         precision = jacobian.T @ (weight[:, None] * jacobian) + root.T @ root
         covariance = np.linalg.inv(precision)

@@ -78,8 +78,6 @@ SMALLEST_DECREASE, SMALLEST_DECREASE_SHARE = 0.02, 3.0e-4
 # A fit of a hypothesis stops early when it cannot reach the required misfit: after this many steps by this
 # many times the last decrease, or after the first by this many times what the linearised problem promises.
 HOPELESS_AFTER, HOPELESS_REACH = 3, 6.0
-# Slopes serve for a further step where they told the last one's change of the readings to this share of it.
-SAME_SLOPES_WITHIN = 0.1
 # A damped step that differs from a refused one by less than this share is not tried.
 SAME_STEP_WITHIN = 0.05
 
