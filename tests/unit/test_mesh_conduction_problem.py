@@ -298,3 +298,11 @@ def test_a_share_of_the_guess_error_may_be_enough(quadratic_system):
     # A guess that is good enough already costs no iteration.
     again = solve_linear(matrix, load, preconditioner, exact + 1e-12, error_tolerance=1e-9)
     assert (again.iterations, again.digits) == (0, 0.0)
+
+
+def test_an_exact_guess_is_the_answer(quadratic_system):
+    matrix = sparse.csr_array(quadratic_system.full_matrix())
+    preconditioner = build_preconditioner(quadratic_system, "multigrid")
+    nothing = np.zeros(matrix.shape[0])
+    found = solve_linear(matrix, nothing, preconditioner, nothing, error_tolerance=1e-9)
+    assert not found.unknowns.any()

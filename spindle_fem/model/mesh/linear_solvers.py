@@ -185,10 +185,12 @@ def solve_linear(
         estimate = largest(first)
         wanted = max(error_tolerance, floor, reduction * estimate)
         if estimate <= wanted:
-            # as far along it as helps: all of it would overshoot where the preconditioner is of another step
-            state = _Iteration(matrix, residual)
-            state.advance(first)
-            return LinearSolution(unknowns + state.unknowns, 0, np.nan)
+            if estimate > 0.0:
+                # as far along it as helps: all of it overshoots where the preconditioner is of another step
+                state = _Iteration(matrix, residual)
+                state.advance(first)
+                unknowns += state.unknowns
+            return LinearSolution(unknowns, 0, np.nan)
         correction, iterations, reached = _to_error(
             matrix, residual, preconditioner.apply, first, wanted, max_iterations
         )
@@ -238,7 +240,8 @@ def _to_error(
         preconditioned = precondition(state.residual)
         reached = largest(preconditioned)
         if reached <= wanted:
-            state.advance(preconditioned)
+            if reached > 0.0:
+                state.advance(preconditioned)
             return state.unknowns, iteration, reached
     return state.unknowns, limit, reached
 
