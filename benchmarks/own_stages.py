@@ -31,7 +31,7 @@ from spindle_fem.results.run_summary import peak_memory_MB
 from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
 from spindle_fem.solvers.prepared_machine import machine_on_mesh
-from spindle_fem.studies.solve_machine import solve_prepared, with_heat_study
+from spindle_fem.studies.solve_machine import solve_prepared
 
 STEP_S = 60.0
 
@@ -84,7 +84,7 @@ def measure(machine_name: str, size_factor: float, steps: int, reduced: bool) ->
     result = solve_prepared(machine)
     lap("checked result")
     with tempfile.TemporaryDirectory() as folder:
-        write_outputs(with_heat_study(result), Path(folder))
+        write_outputs(result, Path(folder))
     lap("heat over speed, pictures and report")
     return {
         "nodes": operators.n_unknowns,

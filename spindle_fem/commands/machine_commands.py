@@ -64,21 +64,17 @@ def run_machine(
         from spindle_fem.results.run_summary import SUMMARY_SCHEMA
         from spindle_fem.solvers.prepared_machine import prepare_machine
         from spindle_fem.studies.run_checks import require_checks
-        from spindle_fem.studies.solve_machine import (
-            estimate_refinement,
-            solve_prepared,
-            with_heat_study,
-        )
+        from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared
 
         prepared = prepare_machine(spec, progress=tell)
-        helpers.prepare(spec, prepared.mesh, prepared.operators.order, prepared.operators.n_unknowns)
-        result = solve_prepared(prepared, progress=tell, find_fold=True)
+        helpers.prepare(spec, prepared.mesh, prepared.operators.n_unknowns)
+        result = solve_prepared(
+            prepared, progress=tell, find_fold=True, solved=lambda first: helpers.begin(first, place)
+        )
         if estimate_mesh_error:
             tell("second mesh")
             result = estimate_refinement(result, spec)
-        helpers.begin(result, place)
-        tell("heat over speed")
-        write_outputs(with_heat_study(result), place, started=started, notify=tell, helpers=helpers)
+        write_outputs(result, place, started=started, notify=tell, helpers=helpers)
     require_checks(result.checks, spec.name)
     return read_content(place / "summary.json", SUMMARY_SCHEMA, "run")
 

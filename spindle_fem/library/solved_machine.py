@@ -18,7 +18,6 @@ from spindle_fem.results.output_folder import output_folder
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.solvers.prepared_machine import Progress
 from spindle_fem.studies import solve_machine
-from spindle_fem.studies.solve_machine import with_heat_study
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -46,7 +45,7 @@ class SolvedMachine(ThermalResult):
             The folder holds something else, or cannot be written.
         """
         with output_folder(folder) as place:
-            write_outputs(with_heat_study(self), place)
+            write_outputs(self, place)
         return place
 
     def plot_temperature(self) -> Figure:

@@ -1,8 +1,8 @@
-"""Every file of a run, written by this process and two that were started beside it.
+"""Every file of a run, written by this process and three that were started beside it.
 
-One draws the pictures, one the charts and the data, and works out growth; both load what they
-need, and do what depends on definition and mesh alone, while the machine is still solved. This
-file itself loads little: it is read before they are started.
+One draws the pictures, one works out and draws the bearings over speed, one draws the charts and writes
+the data and the page; they load what they need, and do what depends on definition and mesh alone, while
+the machine is still solved. This file itself loads little: it is read before they are started.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
     from spindle_fem.definition.machine_spec import MachineSpec
     from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
-    from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
+    from spindle_fem.model.elastic.deformed_shape import BodyShape
+    from spindle_fem.operation.bearing_heat import BearingTemperatures
     from spindle_fem.report.block_page import Illustration
     from spindle_fem.report.drawn_surfaces import SegmentSet
     from spindle_fem.results.thermal_result import ThermalResult
@@ -47,8 +48,8 @@ class OutputHelpers:
         # A copy of a process that has drawn would share the threads of its renderer without having them.
         self._pictures = BackgroundProcess(_PictureWorker, beside=_no_renderer())
         self._charts = BackgroundProcess(_ChartWorker)
+        self._over_speed = BackgroundProcess(_OverSpeedWorker)
         self._waiting: dict[str, Callable[[], Any]] = {}
-        self._shape: Callable[[], Any] | None = None
         self._begun: Path | None = None
 
     def __enter__(self) -> OutputHelpers:
@@ -57,39 +58,36 @@ class OutputHelpers:
     def __exit__(self, *_: object) -> None:
         self._pictures.close()
         self._charts.close()
+        self._over_speed.close()
 
-    def prepare(self, spec: MachineSpec, mesh: TaggedMesh, order: int, n_unknowns: int) -> None:
+    def prepare(self, spec: MachineSpec, mesh: TaggedMesh, n_unknowns: int) -> None:
         """Start the work that needs only mesh and definition."""
         self._pictures.ask("prepare", mesh, n_unknowns)
         self._charts.ask("draw_definition", spec)
-        self._charts.ask("prepare_growth", spec, mesh, order)
 
     def begin(self, result: ThermalResult, folder: Path) -> None:
-        """Write pictures, data and charts of a result, all but those over speed."""
+        """Write pictures, data and charts of a result, all but those of growth."""
         figures = folder / FIGURE_FOLDER
         figures.mkdir(exist_ok=True)
         for old in figures.glob("*.png"):
             old.unlink()
         # what growth is worked out with is large, and not for other processes
-        plain = replace(result, heat_study=None, growth_model=None)
+        plain = replace(result, growth_model=None)
         self._begun = folder
         self._waiting["pictures"] = self._pictures.ask("write", plain, figures)
         self._waiting["data"] = self._charts.ask("write_data", plain, folder)
-        self._shape = self._charts.ask("shape")
-        self._waiting["growth"] = self._charts.ask("write_growth")
         self._waiting["charts"] = self._charts.ask("write_charts")
+        if result.spec.heat.model != "table" and result.bearing_temperatures:
+            temperatures = dict(result.bearing_temperatures)
+            self._waiting["over speed"] = self._over_speed.ask("write", result.spec, temperatures, figures)
 
     def begun_in(self, folder: Path) -> bool:
         """Whether a result's files are being written to this folder."""
         return self._begun == folder
 
-    def draw_over_speed(self, study: Mapping[str, Any]) -> None:
-        """Write the charts over speed of the result begun."""
-        self._waiting["over speed"] = self._charts.ask("write_over_speed", dict(study))
-
-    def shape(self) -> tuple[Growth | None, dict[str, float]]:
-        """Growth and displacements of the result begun."""
-        return self._shape()
+    def draw_growth(self, shapes: Mapping[str, BodyShape]) -> None:
+        """Write how the bodies of the result begun have grown."""
+        self._waiting["growth"] = self._charts.ask("write_growth", dict(shapes))
 
     def wait(self) -> dict[str, float]:
         """Wait for all that was begun; seconds of each part."""
@@ -97,7 +95,7 @@ class OutputHelpers:
 
     def write_report(self, summary: dict[str, Any]) -> None:
         """Write the page of the result begun."""
-        pictures = self._pictures.ask("illustrations")()
+        pictures = self._pictures.ask("illustrations")() | self._over_speed.ask("illustrations")()
         self._charts.ask("write_report", summary, pictures)()
 
 
@@ -144,15 +142,13 @@ def write_outputs(
         helpers.begin(result, folder)
     try:
         with clock.step("fields"):
-            if result.heat_study is not None:
-                helpers.draw_over_speed(result.heat_study)
+            helpers.draw_growth(result.shapes)
             write_fields(result, folder / "fields.vtu")
     finally:  # also after an error nothing must go on writing here
         with clock.step("pictures"):
             beside = helpers.wait()
     with clock.step("report"):
         wall_time = time.perf_counter() - started if started is not None else sum(clock.times.values())
-        result = result.with_shape(*helpers.shape())
         summary = build_summary(result, wall_time, peak_memory_MB())
         summary["timings_s"] = {**summary["timings_s"], **clock.times, **beside}
         replace_text(
@@ -216,6 +212,36 @@ class _PictureWorker:
         return self._drawn
 
 
+class _OverSpeedWorker:
+    """Works out and draws the bearings over speed, at the temperatures of a result."""
+
+    def __init__(self) -> None:
+        from spindle_fem.report import heat_charts
+        from spindle_fem.studies.heat_study import heat_study
+
+        self._heat_study, self._charts = heat_study, heat_charts.CHARTS
+        self._drawn: dict[str, Illustration] = {}
+
+    def write(
+        self, spec: MachineSpec, temperatures: Mapping[str, BearingTemperatures], figures: Path
+    ) -> float:
+        """Write the charts, none where no speed examined has an equilibrium; return the seconds."""
+        from spindle_fem.report.figure_style import image_of
+
+        began = time.perf_counter()
+        study = self._heat_study(spec, temperatures=temperatures)
+        for name, draw in self._charts.items() if study["models"] else ():
+            figure = draw(study)
+            if figure is not None:
+                name = f"{OVER_SPEED}{name}"
+                self._drawn[name] = _write(image_of(figure, colours=_CHART_COLOURS), name, figures)
+        return time.perf_counter() - began
+
+    def illustrations(self) -> dict[str, Illustration]:
+        """The charts for the page."""
+        return self._drawn
+
+
 class _ChartWorker:
     """Draws the charts, writes data and machine, and puts the page together."""
 
@@ -227,7 +253,6 @@ class _ChartWorker:
 
         self._folder = Path()
         self._result: ThermalResult | None = None
-        self._growth_model: GrowthModel | None = None
         self._definition: Image | None = None
         self._dataset: xr.Dataset | None = None
         self._surface: xr.Dataset | None = None
@@ -240,14 +265,6 @@ class _ChartWorker:
 
         self._definition = image_of(machine_drawing(spec), colours=_CHART_COLOURS)
 
-    def prepare_growth(self, spec: MachineSpec, mesh: TaggedMesh, order: int) -> None:
-        """Solve the elastic bodies for what growth is read from."""
-        from spindle_fem.model.elastic.machine_bodies import carries_rings
-        from spindle_fem.model.elastic.machine_growth import GrowthModel
-
-        if carries_rings(spec):
-            self._growth_model = GrowthModel(spec, mesh, order)
-
     def write_data(self, result: ThermalResult, folder: Path) -> float:
         """Write the data and the machine; seconds."""
         from spindle_fem.definition.load import write_machine
@@ -255,7 +272,7 @@ class _ChartWorker:
         from spindle_fem.results.dataset import build_dataset, write_dataset
 
         began = time.perf_counter()
-        self._result, self._folder = replace(result, growth_model=self._growth_model), folder
+        self._result, self._folder = result, folder
         self._dataset, self._surface = build_dataset(result), display_surface(result)
         write_dataset(self._dataset, folder / "result.nc")
         write_dataset(self._surface, folder / "result.nc", group=SURFACE_GROUP)
@@ -271,28 +288,13 @@ class _ChartWorker:
         self._write_all(draw_charts(self._result))
         return time.perf_counter() - began
 
-    def write_over_speed(self, study: Mapping[str, Any]) -> float:
-        """Write the charts of a heat study; seconds."""
-        from spindle_fem.report.heat_charts import CHARTS
-
-        began = time.perf_counter()
-        self._write_all(
-            {f"{OVER_SPEED}{name}": (lambda draw=draw: draw(study)) for name, draw in CHARTS.items()}
-        )
-        return time.perf_counter() - began
-
-    def shape(self) -> tuple[Growth | None, dict[str, float]]:
-        """Growth and displacements of the result."""
-        return self._result.growth, self._result.displacements
-
-    def write_growth(self) -> float:
+    def write_growth(self, shapes: Mapping[str, BodyShape]) -> float:
         """Write the growth of the bodies and the picture of the deformed machine; return the seconds."""
         from spindle_fem.report.growth_chart import deformed_machine
         from spindle_fem.results.dataset import write_dataset
         from spindle_fem.results.growth_file import GROWTH_GROUP, growth_dataset
 
         began = time.perf_counter()
-        shapes = self._result.shapes
         if shapes:
             write_dataset(growth_dataset(shapes), self._folder / "result.nc", group=GROWTH_GROUP)
         self._write_all({"deformed_machine": lambda: deformed_machine(shapes)})

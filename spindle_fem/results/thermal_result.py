@@ -192,8 +192,6 @@ class ThermalResult(Presented):
         More entries of the summary.
     bearing_temperatures : mapping of bearing to BearingTemperatures
         What its friction follows.
-    heat_study : mapping or None
-        Heat over speed at this run's temperatures, if requested.
     growth_model : GrowthModel or None
         Where the solution made one already.
     equilibrium : Equilibrium or None
@@ -226,7 +224,6 @@ class ThermalResult(Presented):
     circuits: Mapping[str, CircuitResult] = field(default_factory=dict)
     extra: Mapping[str, Any] = field(default_factory=dict)
     bearing_temperatures: Mapping[str, BearingTemperatures] = field(default_factory=dict)
-    heat_study: Mapping[str, Any] | None = None
     growth_model: GrowthModel | None = None
     equilibrium: Equilibrium | None = None
 
@@ -292,12 +289,6 @@ class ThermalResult(Presented):
             rows["coolant"] = f"{self.coolant.heat:.0f} W"
         rows["heat in"] = f"{self.energy.heat_in:.1f} W, imbalance {self.energy.imbalance_relative:.0e}"
         return rows
-
-    def with_shape(self, growth: Growth | None, displacements: Mapping[str, float]) -> ThermalResult:
-        """Copy with :attr:`growth` and :attr:`displacements` from another process."""
-        shaped = replace(self)
-        shaped.__dict__.update(growth=growth, displacements=dict(displacements))
-        return shaped
 
     def with_timings(self, timings: Mapping[str, float]) -> ThermalResult:
         """Copy with the seconds of each stage."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,7 +35,6 @@ from spindle_fem.solvers.coupled_steady import (
 )
 from spindle_fem.solvers.prepared_machine import Clock, PreparedMachine, Progress, prepare_machine
 from spindle_fem.studies import run_checks as checks
-from spindle_fem.studies.heat_study import heat_study
 from spindle_fem.studies.machine_equilibrium import equilibrium_of
 from spindle_fem.validity import CodedWarning, by_consequence
 
@@ -79,6 +78,7 @@ def solve_prepared(
     *,
     progress: Progress = lambda stage: None,
     find_fold: bool = False,
+    solved: Callable[[ThermalResult], None] = lambda result: None,
 ) -> ThermalResult:
     """Steady temperatures of a prepared machine; see :func:`solve`.
 
@@ -86,6 +86,8 @@ def solve_prepared(
     ----------
     find_fold : bool
         Whether to look for the speed at which a preload that is followed runs away.
+    solved : callable
+        Called with the result before that speed is looked for.
     """
     clock = Clock(progress)
     clock.begin("solve")
@@ -100,9 +102,10 @@ def solve_prepared(
         beyond = steady_physics(machine, physics)
     coupled = solve_coupled(machine, point, beyond=beyond)
     clock.begin("evaluate")
-    result = _build_result(machine, point, coupled)
+    result = replace(_build_result(machine, point, coupled), growth_model=machine.growth)
+    solved(result)
     equilibrium = equilibrium_of(machine, point, coupled, result.bearings, search=find_fold)
-    result = replace(result, growth_model=machine.growth, equilibrium=equilibrium)
+    result = replace(result, equilibrium=equilibrium)
     clock.end()
     return result.with_timings({**machine.timings, **clock.timings})
 
@@ -368,18 +371,6 @@ def _probes(
         elif probe.kind == "circuit_outlet":
             readings[probe.name] = circuits[probe.circuit].outlet_temperature
     return {probe.name: readings[probe.name] for probe in machine.spec.probe}
-
-
-def with_heat_study(result: ThermalResult) -> ThermalResult:
-    """The result with bearing loads, films and heat over speed added, at its own temperatures.
-
-    Unchanged if the heat comes from a table, or no speed examined has an equilibrium.
-    """
-    spec = result.spec
-    if spec.heat.model == "table" or not result.bearings:
-        return result
-    study = heat_study(spec, temperatures=result.bearing_temperatures)
-    return replace(result, heat_study=study) if study["models"] else result
 
 
 def estimate_refinement(result: ThermalResult, spec: MachineSpec) -> ThermalResult:

@@ -211,7 +211,7 @@ def run_folder(result, tmp_path_factory):
     assert steps == ["fields", "pictures", "report"]
     assert list(times) == [
         *steps,
-        *(f"in parallel: {what}" for what in ("pictures", "data", "growth", "charts")),
+        *(f"in parallel: {what}" for what in ("pictures", "data", "charts", "growth")),
     ]
     return folder
 
@@ -270,7 +270,7 @@ def test_pictures_fill_their_page(run_folder):
 @pytest.mark.render
 def test_helpers_that_were_started_before_write_the_same_files(run_folder, result, tmp_path):
     with output_folder(tmp_path / "run") as folder, OutputHelpers() as helpers:
-        helpers.prepare(result.spec, result.mesh, result.order, result.n_unknowns)
+        helpers.prepare(result.spec, result.mesh, result.n_unknowns)
         helpers.begin(result, folder)
         write_outputs(result, folder, helpers=helpers)
     figures = sorted(path.name for path in (run_folder / "figures").glob("*.png"))
