@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from spindle_fem.errors import RecordingError
+from spindle_fem.inference.belief import Belief, Coordinate
 from spindle_fem.inference.coordinate_names import START_PREFIX
-from spindle_fem.inference.hypothesis_fit import OUTLIER_SIGMAS, Belief, Coordinate, Fit, Problem
+from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.priors import Prior
 from spindle_fem.inference.reading_noise import SlowError, likely_slow_error
+from spindle_fem.inference.robust_size import OUTLIER_SIGMAS
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]

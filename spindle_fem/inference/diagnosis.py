@@ -14,10 +14,11 @@ from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.registry import candidates_for, catalogue, interval_effects
 from spindle_fem.inference import tuned
+from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.candidate_response import variants_of
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis import Hypothesis
-from spindle_fem.inference.hypothesis_fit import Coordinate, Fit, Problem, huber
+from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.input_sampling import left_over_noise
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
@@ -33,6 +34,7 @@ from spindle_fem.inference.prepared_problem import (
     with_own_noise,
 )
 from spindle_fem.inference.reading_noise import ChannelBins, Whitener
+from spindle_fem.inference.robust_size import huber
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.state_search import Told, told_states
@@ -151,13 +153,13 @@ def diagnose_recordings(
     effects = catalogue()
     weights = {name: effect.prior_weight for name, effect in effects.items()}
     small, known = searched_predictor(predictor, view, candidates)
-    problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
+    problem = Problem(small, calibrated.known, calibrated.slow, small.observations)
     if directions:
         # Their columns, about the machine as its recordings show it.
         values = problem.fit().values
         predictor = with_misdescriptions(predictor, directions, values)
         small = small.misdescribed_like(predictor)
-        problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
+        problem = Problem(small, calibrated.known, calibrated.slow, small.observations)
     problem = with_inexact_laws(problem, problem.fit())
     clock.lap("reduction")
     search = Search(problem, view, effects, candidates, interval_effects(), weights, progress, workers)
@@ -175,7 +177,7 @@ def diagnose_recordings(
         problem = Problem(small, belief, slow, small.observations)
         slow = slow_error_of(problem, problem.fit((), empty.fit.values))
     else:
-        wrong, belief = None, calibrated.belief
+        wrong, belief = None, calibrated.known
     unchanged = predictor
     if machine.is_network:
         unchanged = with_misdescriptions(predictor, directions, empty.fit.values)

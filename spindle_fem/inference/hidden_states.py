@@ -71,8 +71,8 @@ def readings_about(
     predicted = predictor.predict(number, values, rest, [c.name for c in coordinates])
     root = np.eye(len(coordinates))
     machine = len(problem.belief.coordinates)
-    root[:machine, :machine] = problem.belief.root
-    mean = np.concatenate((problem.belief.mean, np.zeros(len(coordinates) - machine)))
+    root[:machine, :machine] = fit.known.root
+    mean = np.concatenate((fit.known.mean, np.zeros(len(coordinates) - machine)))
     by = predicted.sensitivity * np.array([c.sigma for c in coordinates])
     model = predicted.temperature
     if everything:

@@ -20,84 +20,22 @@ from scipy.stats import norm
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.inference import tuned
-from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
+from spindle_fem.inference.belief import Belief, Coordinate, Departure
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, NO_VALUES
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import ChannelBins, SlowError, Whitener
+from spindle_fem.inference.robust_size import huber, outlier_weight
 
 Array = NDArray[np.float64]
 
-# Whitened residuals beyond this count linearly.
-OUTLIER_SIGMAS = 3.0
 # Steps of a fit at most.
 MOST_ITERATIONS = 30
 # An exact fit ends with a step that lowers the misfit by less than this share: rounding comes next.
 EXACT_SHARE = 1.0e-8
-# Largest change of any coordinate in one step, and bound of the machine's coordinates, in prior deviations.
+# Largest change of any coordinate in one step, in prior deviations.
 LARGEST_MOVE = 2.0
-THETA_BOUND = 4.0
-
-
-@dataclass(frozen=True, slots=True)
-class Coordinate:
-    """One free number in units of its prior.
-
-    Attributes
-    ----------
-    name : str
-        As :class:`Predictor` takes it.
-    value : float
-        At zero.
-    sigma : float
-        1 σ, of the logarithm where ``logarithmic``.
-    low, high : float
-        Bounds of the coordinate.
-    """
-
-    name: str
-    value: float
-    sigma: float
-    logarithmic: bool
-    low: float
-    high: float
-    unit: str = ""
-
-    def at(self, coordinate: float) -> float:
-        """Value at a coordinate."""
-        if self.logarithmic:
-            return self.value * float(np.exp(self.sigma * coordinate))
-        # of a row of an array: values are written into definitions
-        return float(self.value + self.sigma * coordinate)
-
-    def of(self, value: float) -> float:
-        """Coordinate of a value, within the bounds."""
-        if self.logarithmic:
-            found = np.log(value / self.value) / self.sigma
-        else:
-            found = (value - self.value) / self.sigma
-        return float(np.clip(found, self.low, self.high))
-
-
-@dataclass(frozen=True, slots=True)
-class Belief:
-    """Knowledge of the machine's own coordinates before the diagnosed recording.
-
-    Attributes
-    ----------
-    mean : (p,) ndarray
-    root : (p, p) ndarray
-        ``rootᵀ root`` is the precision.
-    """
-
-    coordinates: tuple[Coordinate, ...]
-    mean: Array
-    root: Array
-
-    @classmethod
-    def prior(cls, coordinates: Sequence[Coordinate]) -> Belief:
-        """Belief from the definition alone."""
-        return cls(tuple(coordinates), np.zeros(len(coordinates)), np.eye(len(coordinates)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +57,8 @@ class Fit:
         The same with the squared distance from what was known before.
     residual : (n,) ndarray
         Whitened.
+    known : Belief
+        What was known of the machine before, as a normal distribution about the optimum.
     evaluations : int
         Number of predictions.
     """
@@ -132,6 +72,7 @@ class Fit:
     misfit_with_prior: float
     residual: Array
     slow: SlowError
+    known: Belief
     evaluations: int = 0
 
     @property
@@ -250,19 +191,21 @@ class Problem:
         *,
         by: Sequence[int] | None = None,
         near: Sequence[Prediction] | None = None,
+        beside: Mapping[str, float] = NO_VALUES,
     ) -> list[Prediction]:
         """Every recording, with derivatives by some of the coordinates, by all when absent.
 
-        ``near`` are predictions at a position that is near, which these begin from.
+        ``near`` are predictions at a position that is near, which these begin from; ``beside`` are values
+        of what is not among the coordinates.
         """
-        values = {c.name: c.at(u) for c, u in zip(coordinates, position, strict=True)}
+        values = {c.name: c.at(u) for c, u in zip(coordinates, position, strict=True)} | dict(beside)
         derived = coordinates if by is None else [coordinates[index] for index in by]
         names = [c.name for c in derived]
         scale = np.array([c.sigma for c in derived])
         found = []
         for number in range(len(self.predictor.recordings)):
-            beside = None if near is None else near[number]
-            prediction = self.predictor.predict(number, values, candidates, names, beside)
+            begun = None if near is None else near[number]
+            prediction = self.predictor.predict(number, values, candidates, names, begun)
             found.append(replace(prediction, sensitivity=prediction.sensitivity * scale))
         return found
 
@@ -294,55 +237,28 @@ class Problem:
         """
         own = tuple(c for candidate in candidates for c in candidate_coordinates(candidate))
         coordinates = (*self.belief.coordinates, *own)
-        n_own, n_machine = len(own), len(self.belief.coordinates)
         given = dict(start or {})
-        position = np.concatenate((self.belief.mean, np.zeros(n_own)))
+        position = np.concatenate((self.belief.start, np.zeros(len(own))))
         for index, coordinate in enumerate(coordinates):
             if coordinate.name in given:
                 position[index] = coordinate.of(given[coordinate.name])
         low = np.array([c.low for c in coordinates])
         high = np.array([c.high for c in coordinates])
         position = np.clip(position, low, high)
-        root = np.eye(len(coordinates))
-        root[:n_machine, :n_machine] = self.belief.root
-        mean = np.concatenate((self.belief.mean, np.zeros(n_own)))
-
-        def cost_at(at: Array, near: list[Prediction] | None) -> tuple[float, Array, list[Prediction] | None]:
-            nonlocal evaluations
-            evaluations += 1
-            predicted = self.predict(candidates, coordinates, at, by=(), near=near)
-            residual = self.data - self.whitened([p.temperature for p in predicted])
-            pull = root @ (at - mean)
-            return float(np.sum(huber(residual)) + pull @ pull), residual, predicted
-
-        def slopes_at(at: Array, near: list[Prediction]) -> tuple[Array, list[Prediction]]:
-            predicted = self.predict(candidates, coordinates, at, by=bent, near=near)
-            slopes[:, bent] = self.whitened([p.sensitivity for p in predicted])
-            return slopes, predicted
-
-        evaluations = 0
-        scale = np.array([c.sigma for c in coordinates])
-        straight = self.straight(candidates)
-        bent = [index for index, c in enumerate(coordinates) if c.name not in straight]
-        slopes = np.empty((len(self.data), len(coordinates)))
-        for index, coordinate in enumerate(coordinates):
-            if coordinate.name in straight:
-                slopes[:, index] = coordinate.sigma * straight[coordinate.name]
-        cost, residual, predicted = cost_at(position, None)
-        jacobian, predicted = slopes_at(position, predicted)
+        objective = _Objective(self, candidates, coordinates)
+        point = objective.at(position, None)
+        slopes = objective.slopes(point)
         damping = 1e-3
         for iteration in range(iterations):
-            weight = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(np.abs(residual), 1e-12))
-            hessian = jacobian.T @ (weight[:, None] * jacobian) + root.T @ root
-            gradient = jacobian.T @ (weight * residual) - root.T @ (root @ (position - mean))
+            hessian, gradient = slopes.curvature(point), slopes.downhill(point)
             if iteration and np.isfinite(hopeless):
-                whole = _bounded_step(hessian, gradient, 0.0, position, low, high)
+                whole = _bounded_step(hessian, gradient, 0.0, point.position, low, high)
                 promised = float(2.0 * gradient @ whole - whole @ hessian @ whole)
-                if promised > 0.0 and cost - tuned.HOPELESS_REACH * promised > hopeless:
+                if promised > 0.0 and point.cost - tuned.HOPELESS_REACH * promised > hopeless:
                     break
-            improved, gain, refused = False, 0.0, None
+            gain, refused = 0.0, None
             while damping < 1e8:
-                move = _bounded_step(hessian, gradient, damping, position, low, high)
+                move = _bounded_step(hessian, gradient, damping, point.position, low, high)
                 largest = float(np.abs(move).max()) if move.size else 0.0
                 if largest > LARGEST_MOVE:
                     move *= LARGEST_MOVE / largest
@@ -353,57 +269,139 @@ class Problem:
                     damping *= 10.0
                     continue
                 try:
-                    trial = cost_at(position + move, [item.moved((scale * move)[bent]) for item in predicted])
+                    trial = objective.at(point.position + move, slopes.predicted_after(move))
                 except (ConvergenceError, OutOfValidityError, SpecError):
                     # Outside what can be simulated (a share above one, a runaway): a shorter step.
-                    trial = (np.inf, residual, None)
-                if trial[0] < cost - 1e-9:
-                    gain = cost - trial[0]
-                    position = position + move
-                    cost, residual, predicted = trial
-                    jacobian, predicted = slopes_at(position, predicted)
+                    trial = None
+                if trial is not None and trial.cost < point.cost - 1e-9:
+                    gain = point.cost - trial.cost
+                    point = trial
+                    slopes = objective.slopes(point)
                     damping = max(damping / 10.0, 1e-6)
-                    improved = True
                     break
                 if largest < 1e-6:
                     break
                 refused = move
                 damping *= 10.0
-            if not improved or gain < (
-                EXACT_SHARE * cost
+            # A step that was taken gains more than nothing.
+            if gain == 0.0 or gain < (
+                EXACT_SHARE * point.cost
                 if exact
-                else tuned.SMALLEST_DECREASE + tuned.SMALLEST_DECREASE_SHARE * cost
+                else tuned.SMALLEST_DECREASE + tuned.SMALLEST_DECREASE_SHARE * point.cost
             ):
                 break
-            if iteration >= tuned.HOPELESS_AFTER and cost - tuned.HOPELESS_REACH * gain > hopeless:
+            if iteration >= tuned.HOPELESS_AFTER and point.cost - tuned.HOPELESS_REACH * gain > hopeless:
                 break
-        if not np.isfinite(cost):
+        if not np.isfinite(point.cost):
             raise ConvergenceError("diagnosis", "a hypothesis cannot be simulated at any of its parameters.")
-        weight = np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(np.abs(residual), 1e-12))
-        precision = jacobian.T @ (weight[:, None] * jacobian) + root.T @ root
+        precision = slopes.curvature(point)
         covariance = np.linalg.inv(precision)
         _, log_det = np.linalg.slogdet(precision)
-        _, log_root = np.linalg.slogdet(root)
+        _, log_root = np.linalg.slogdet(self.belief.root)
         # A prior that ends at bounds is so much denser between them.
         cut_off = -sum(float(np.log(norm.cdf(c.high) - norm.cdf(c.low))) for c in own)
         return Fit(
             tuple(candidates),
             coordinates,
-            position,
+            point.position,
             0.5 * (covariance + covariance.T),
-            -0.5 * cost - 0.5 * log_det + log_root + cut_off,
-            float(np.sum(huber(residual))),
-            cost,
-            residual,
+            -0.5 * point.cost - 0.5 * log_det + log_root + cut_off,
+            float(np.sum(huber(point.residual))),
+            point.cost,
+            point.residual,
             self.slow,
-            evaluations,
+            point.apart.local(slopes.pulled),
+            objective.evaluations,
         )
 
 
-def huber(residual: Array) -> Array:
-    """Square of a whitened residual, beyond ``OUTLIER_SIGMAS`` linear."""
-    size = np.abs(residual)
-    return np.where(size <= OUTLIER_SIGMAS, residual**2, 2.0 * OUTLIER_SIGMAS * size - OUTLIER_SIGMAS**2)
+@dataclass(frozen=True, slots=True)
+class _Point:
+    """A hypothesis at one position, and how far that is from what was known."""
+
+    position: Array
+    cost: float
+    residual: Array
+    predicted: list[Prediction]
+    apart: Departure
+
+
+@dataclass(frozen=True, slots=True)
+class _Slopes:
+    """Derivatives of a hypothesis at a point.
+
+    Attributes
+    ----------
+    jacobian : (n, p) ndarray
+        Of the whitened readings.
+    pulled : (m, q) ndarray
+        Of the departures from what was known, by the machine's ``q`` coordinates; the rest has a unit prior.
+    predicted : list of Prediction
+        With derivatives by the coordinates ``bent``, which readings follow along curves.
+    """
+
+    jacobian: Array
+    pulled: Array
+    predicted: list[Prediction]
+    bent: list[int]
+    scale: Array
+
+    def curvature(self, point: _Point) -> Array:
+        """Half the second derivatives of the cost, to first order of the readings, (p, p)."""
+        found = self.jacobian.T @ (outlier_weight(point.residual)[:, None] * self.jacobian)
+        machine = self.pulled.shape[1]
+        found[:machine, :machine] += self.pulled.T @ self.pulled
+        rest = range(machine, len(found))
+        found[rest, rest] += 1.0
+        return found
+
+    def downhill(self, point: _Point) -> Array:
+        """Minus half the gradient of the cost, (p,)."""
+        machine = self.pulled.shape[1]
+        found = self.jacobian.T @ (outlier_weight(point.residual) * point.residual)
+        found[:machine] -= self.pulled.T @ point.apart.residual
+        found[machine:] -= point.position[machine:]
+        return found
+
+    def predicted_after(self, move: Array) -> list[Prediction]:
+        """Predictions after a step to first order."""
+        return [item.moved((self.scale * move)[self.bent]) for item in self.predicted]
+
+
+class _Objective:
+    """Cost of a hypothesis and its derivatives."""
+
+    def __init__(
+        self, problem: Problem, candidates: Sequence[Candidate], coordinates: Sequence[Coordinate]
+    ) -> None:
+        self.problem, self.candidates, self.coordinates = problem, candidates, coordinates
+        self.evaluations = 0
+        self._scale = np.array([c.sigma for c in coordinates])
+        straight = problem.straight(candidates)
+        self._bent = [index for index, c in enumerate(coordinates) if c.name not in straight]
+        self._straight = {i: straight[c.name] for i, c in enumerate(coordinates) if c.name in straight}
+
+    def at(self, position: Array, near: list[Prediction] | None) -> _Point:
+        """The hypothesis at a position; ``near`` are predictions that these begin from."""
+        self.evaluations += 1
+        problem, machine = self.problem, len(self.problem.belief.coordinates)
+        predicted = problem.predict(self.candidates, self.coordinates, position, by=(), near=near)
+        residual = problem.data - problem.whitened([p.temperature for p in predicted])
+        apart = problem.belief.at(position[:machine])
+        added = float(position[machine:] @ position[machine:])
+        cost = float(np.sum(huber(residual))) + apart.cost + added
+        return _Point(position, cost, residual, predicted, apart)
+
+    def slopes(self, point: _Point) -> _Slopes:
+        """Derivatives at a point."""
+        predicted = self.problem.predict(
+            self.candidates, self.coordinates, point.position, by=self._bent, near=point.predicted
+        )
+        jacobian = np.empty((len(self.problem.data), len(self.coordinates)))
+        for index, column in self._straight.items():
+            jacobian[:, index] = self._scale[index] * column
+        jacobian[:, self._bent] = self.problem.whitened([p.sensitivity for p in predicted])
+        return _Slopes(jacobian, point.apart.slopes, predicted, self._bent, self._scale)
 
 
 def _bounded_step(

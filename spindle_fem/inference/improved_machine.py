@@ -9,6 +9,7 @@ from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.load import write_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.registry import definition_entry
+from spindle_fem.inference.belief import Belief
 from spindle_fem.inference.coordinate_names import (
     FIRST_ORDER,
     MISDESCRIBED_IN_PREFIX,
@@ -17,7 +18,7 @@ from spindle_fem.inference.coordinate_names import (
 )
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import candidate_values
-from spindle_fem.inference.hypothesis_fit import Belief, Fit, Problem
+from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.prepared_problem import slow_error_of
 from spindle_fem.model.lumped.written_network import value_in_definition
@@ -28,7 +29,7 @@ def _without_directions(diagnosis: Diagnosis) -> Fit:
     """The chosen set on the machine as its definition can be written."""
     if not diagnosis.predictor.misdescribed:
         return diagnosis.final
-    predictor, belief = diagnosis.predictor.misdescribed_by((), {}), diagnosis.calibrated.belief
+    predictor, belief = diagnosis.predictor.misdescribed_by((), {}), diagnosis.final.known
     of_directions = (MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)
     kept = [i for i, item in enumerate(belief.coordinates) if not item.name.startswith(of_directions)]
     covariance = np.linalg.inv(belief.root.T @ belief.root)[np.ix_(kept, kept)]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov
 
 from spindle_fem.inference import tuned
-from spindle_fem.inference.hypothesis_fit import huber
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.robust_size import huber
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.recordings.align import Recording
 

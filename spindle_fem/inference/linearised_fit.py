@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from spindle_fem.errors import ConvergenceError
-from spindle_fem.inference.hypothesis_fit import OUTLIER_SIGMAS, Fit, Problem
+from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.robust_size import outlier_weight
 
 Array = NDArray[np.float64]
 
@@ -190,11 +191,11 @@ class LinearProblem:
         residual = problem.data - problem.whitened([p.temperature for p in predicted])
         n_machine = len(problem.belief.coordinates)
         root = np.eye(len(fit.coordinates))
-        root[:n_machine, :n_machine] = problem.belief.root
-        mean = np.concatenate((problem.belief.mean, np.zeros(len(fit.coordinates) - n_machine)))
+        root[:n_machine, :n_machine] = fit.known.root
+        mean = np.concatenate((fit.known.mean, np.zeros(len(fit.coordinates) - n_machine)))
         # The tails that a robust fit discounts are discounted here too.
-        astray = np.abs(residual if trust is None else trust.residual)
-        weight = np.sqrt(np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(astray, 1e-12)))
+        astray = residual if trust is None else trust.residual
+        weight = np.sqrt(outlier_weight(astray))
         departure = root @ (fit.position - mean)
         downhill = jacobian.T @ (weight**2 * residual) - root.T @ departure
         free = ~_pressed(fit, downhill)

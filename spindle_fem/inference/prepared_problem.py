@@ -10,15 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.inference import tuned
+from spindle_fem.inference.belief import THETA_BOUND, Belief, Coordinate
 from spindle_fem.inference.calibration import coordinate_of
 from spindle_fem.inference.coordinate_names import DIRECTIONS, PROBE_PREFIX
+from spindle_fem.inference.earlier_readings import EarlierReadings
 from spindle_fem.inference.hypothesis import Hypothesis
-from spindle_fem.inference.hypothesis_fit import THETA_BOUND, Belief, Coordinate, Fit, Problem, huber
+from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.input_sampling import own_times, sampling_errors
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import ChannelBins, SlowError, likely_slow_error, slow_errors_of
+from spindle_fem.inference.robust_size import huber
 
 Array = NDArray[np.float64]
 # Residuals of the bin means of every observation, [K].
@@ -40,11 +43,16 @@ class Calibrated:
 
     Attributes
     ----------
+    belief : Belief
+        Of the machine after them, as a normal distribution.
+    known : Belief
+        With the readings themselves where the machine is a network, whose values are guesses.
     fit : Fit or None
         None without calibration recordings.
     """
 
     belief: Belief
+    known: Belief
     slow: SlowError
     fit: Fit | None
 
@@ -246,7 +254,8 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
     """
     shared, begun = machine_coordinates(predictor), start_coordinates(predictor)
     if earlier is None:
-        return Calibrated(known_before(predictor), expected_slow_error(predictor), None)
+        belief = known_before(predictor)
+        return Calibrated(belief, belief, expected_slow_error(predictor), None)
     slow, fit = expected_slow_error(earlier), None
     prior = known_before(earlier)
     for _ in range(CALIBRATION_ROUNDS):
@@ -269,7 +278,12 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
     mean = belief.mean.copy()
     mean[rows] = fit.position[fitted]
     root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
-    return Calibrated(Belief((*shared, *begun), mean, root), slow, fit)
+    after = Belief((*shared, *begun), mean, root)
+    if not predictor.is_network:
+        return Calibrated(after, after, slow, fit)
+    problem = Problem(earlier, prior, slow, earlier.observations)
+    own = EarlierReadings.about(problem, problem.fit((), fit.values, iterations=0))
+    return Calibrated(after, replace(belief, earlier=own, begin=mean), slow, fit)
 
 
 def _as_stated(before: Array, after: Array) -> Array:

@@ -8,7 +8,7 @@ course is its likelihood over that of all courses under the fitted chain.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -180,22 +180,31 @@ def _settle_again(search: Search, fit: Fit, candidate: Candidate) -> None:
     settle(search, fit, place, again, candidate)
     for other in fit.candidates:
         if other is not candidate:
-            rest, values = without(fit, other)
-            settle(search, search.problem.fit(rest, values), place, again, candidate)
+            begun = _simulated(search, *without(fit, other))
+            if begun is not None:
+                settle(search, begun, place, again, candidate)
     twin = _twin(search, fit, place, candidate, tuned.FAIR_SHARE * again.log_evidence)
     if twin is not None:
         settle(search, fit, *twin, candidate)
 
 
+def _simulated(search: Search, candidates: tuple[Candidate, ...], values: Mapping[str, float]) -> Fit | None:
+    """A fit; None where the set cannot be simulated."""
+    try:
+        return search.problem.fit(candidates, values)
+    except (ConvergenceError, OutOfValidityError, SpecError):
+        return None
+
+
 def _settle_intervals(search: Search, fit: Fit, candidate: Candidate) -> None:
-    """A state in the stead of an effect in intervals."""
+    """A state in the stead of an effect in intervals, where something may switch at its place."""
     number = candidate.recording or 0
-    place = next(
-        item
-        for item in state_places(search)
-        if (item.effect.name, item.pattern.spot, item.recording)
-        == (candidate.effect, candidate.component, number)
-    )
+    wanted = candidate.effect, candidate.component, number
+    places = {(p.effect.name, p.pattern.spot, p.recording): p for p in state_places(search)}
+    if wanted not in places:
+        # A level may change at more places than those that may switch.
+        return
+    place = places[wanted]
     rest, values = without(fit, candidate)
     base = BaseRun(search.problem.predictor, number, values, rest)
     readings = ReadingFilter(readings_about(search.problem, fit, number, candidate))
@@ -255,9 +264,8 @@ def settle(
         candidate = _candidate(search, place, intervals, course)
         factor = values.get(candidate.sized_by, 1.0)
         start = values | {amplitude_name(candidate): course.size / factor}
-        try:
-            fitted = problem.fit((*rest, candidate), start)
-        except (ConvergenceError, OutOfValidityError, SpecError):
+        fitted = _simulated(search, (*rest, candidate), start)
+        if fitted is None:
             return
         paid = course.log_choice + len(course.chain.begin) * float(np.log(len(course.on)))
         known = search.courses.get(candidate.amplitude)

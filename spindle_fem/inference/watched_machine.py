@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.inference import tuned
+from spindle_fem.inference.belief import Belief, Coordinate
 from spindle_fem.inference.continued_run import ContinuedRun
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, OF_ONE_RECORDING, START_PREFIX
 from spindle_fem.inference.cumulative_sums import CumulativeSums, spread_of_sound
-from spindle_fem.inference.hypothesis_fit import Belief, Coordinate
 from spindle_fem.inference.innovations import InnovationFilter
 from spindle_fem.inference.missing_heat import conditions_of
 from spindle_fem.inference.observations import Observation

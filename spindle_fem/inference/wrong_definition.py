@@ -13,7 +13,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from spindle_fem.inference import tuned
-from spindle_fem.inference.hypothesis_fit import THETA_BOUND, Belief, Fit
+from spindle_fem.inference.belief import THETA_BOUND, Belief
+from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.verdict import PRIOR_SIGMAS, Judgement
 
@@ -90,7 +91,7 @@ def without_prior(belief: Belief, row: int) -> Belief:
     coordinates = list(belief.coordinates)
     bound = THETA_BOUND * WIDER
     coordinates[row] = replace(coordinates[row], low=-bound, high=bound)
-    return Belief(tuple(coordinates), belief.mean, root)
+    return replace(belief, coordinates=tuple(coordinates), root=root)
 
 
 def with_wrong_definition(judgement: Judgement, null: Fit, wrong: WrongDirection | None) -> Judgement:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.inference import tuned
-from spindle_fem.inference.hypothesis_fit import Coordinate, Fit
+from spindle_fem.inference.belief import Coordinate
+from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.mismatch_place import component_shares
 from spindle_fem.inference.next_measurement import hypothesis_words
 from spindle_fem.inference.verdict import rank

@@ -12,19 +12,16 @@ from scipy.stats import chi2, multivariate_normal
 from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.effects.registry import candidates_for, interval_effects
 from spindle_fem.errors import ConvergenceError
+from spindle_fem.inference.belief import Belief
 from spindle_fem.inference.candidate_response import BaseRun, Variant
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.drive_steps import even_drive
-from spindle_fem.inference.hypothesis_fit import (
-    Belief,
-    Problem,
-    candidate_coordinates,
-    huber,
-)
+from spindle_fem.inference.hypothesis_fit import Problem, candidate_coordinates
 from spindle_fem.inference.linearised_fit import LinearProblem
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates, slow_error_of
 from spindle_fem.inference.reading_noise import SlowError
+from spindle_fem.inference.robust_size import huber
 from spindle_fem.inference.tuned import INTERVAL_WIDENING
 from spindle_fem.model.lumped.network_view import view_of_network
 from spindle_fem.model.lumped.written_network import build_network

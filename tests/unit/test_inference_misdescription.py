@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.definition.load import load_machine, write_machine
+from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_PREFIX
 from spindle_fem.inference.heat_misdescriptions import (
@@ -20,7 +21,7 @@ from spindle_fem.inference.heat_misdescriptions import (
     shape_modes,
 )
 from spindle_fem.inference.hypothesis import Hypothesis
-from spindle_fem.inference.hypothesis_fit import Coordinate, Problem
+from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.misdescription_content import misdescription_content

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from spindle_fem.inference.hypothesis_fit import (
-    Coordinate,
-    _bounded_step,
-    huber,
-)
+from spindle_fem.inference.belief import Coordinate
+from spindle_fem.inference.hypothesis_fit import _bounded_step
 from spindle_fem.inference.reading_noise import ChannelBins, SlowError, Whitener, likely_slow_error
+from spindle_fem.inference.robust_size import huber
 
 
 def test_coordinates_go_there_and_back():

@@ -11,8 +11,9 @@ from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.effects.framework.unrecorded import InIntervals, UnrecordedHeatTerm
 from spindle_fem.inference import tuned
+from spindle_fem.inference.belief import Belief, Coordinate
 from spindle_fem.inference.hypothesis import Hypothesis
-from spindle_fem.inference.hypothesis_fit import Coordinate, Fit
+from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
 from spindle_fem.inference.verdict import (
@@ -37,16 +38,9 @@ DATA = 400
 
 def candidate(effect, component="front_bearings", kind="missing_physics", form="", factor=None):
     factors = () if factor is None else (TermParameter(factor, 1.0, 0.6),)
+    size = factor or f"{effect}.size"
     return Candidate(
-        effect,
-        component,
-        form,
-        kind,
-        factor or f"{effect}.size",
-        1.0,
-        1.2,
-        factors=factors,
-        shift_of_prior=bool(factor),
+        effect, component, form, kind, size, 1.0, 1.2, factors=factors, shift_of_prior=bool(factor)
     )
 
 
@@ -70,6 +64,7 @@ def hypothesis(*candidates, misfit, evidence=None, log_prior=0.0, position=(), r
         misfit,
         np.zeros(DATA),
         SlowError(),
+        Belief.prior((HEAT,)),
     )
     return Hypothesis(fit, log_prior)
 

@@ -1,0 +1,121 @@
+"""What calibration recordings say of a machine's coordinates, wherever those are moved.
+
+A posterior that is normal about the fit to a calibration holds in its neighbourhood only: a network whose
+values are guesses can leave it along curved valleys in which that normal form forbids little and the readings
+forbid much. So the readings themselves are asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.belief import Coordinate
+from spindle_fem.inference.coordinate_names import OF_ONE_RECORDING
+from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.prediction import Prediction
+from spindle_fem.inference.robust_size import outlier_weight
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class EarlierReadings:
+    """Calibration readings as a function of the coordinates that the machine keeps.
+
+    Quantities of one recording (its start, its gaps, its clocks) are marginalised to first order about the
+    fit, and what counts of an outlier is that of the fit. Residuals are divided by ``INTERVAL_WIDENING``: a
+    model that is not exact has other best parameters in another duty.
+
+    Attributes
+    ----------
+    problem : Problem
+        The calibration, about whose fit this is.
+    own : dict
+        Fitted values of what belongs to its recordings.
+    offset : (n,) ndarray
+        What those fitted values do to the whitened readings.
+    weight : (n,) ndarray
+        Root of what each reading counts.
+    modes, share : (n, k) and (k,) ndarray
+        Directions in which what belongs to one recording moves the readings, and the share by which residuals
+        in them count less.
+    least : float
+        Sum of squares at the fit.
+    """
+
+    problem: Problem
+    own: dict[str, float]
+    offset: Array
+    weight: Array
+    modes: Array
+    share: Array
+    least: float = 0.0
+
+    @classmethod
+    def about(cls, problem: Problem, fit: Fit) -> EarlierReadings:
+        """From the fit of a calibration."""
+        weight = np.sqrt(outlier_weight(fit.residual))
+        rows = [i for i, c in enumerate(fit.coordinates) if c.name.startswith(OF_ONE_RECORDING)]
+        predicted = problem.predict((), fit.coordinates, fit.position, by=rows)
+        columns = problem.whitened([p.sensitivity for p in predicted])
+        modes, size, _ = np.linalg.svd(weight[:, None] * columns, full_matrices=False)
+        values = fit.values
+        found = cls(
+            problem,
+            {fit.coordinates[i].name: values[fit.coordinates[i].name] for i in rows},
+            columns @ fit.position[rows],
+            weight,
+            modes,
+            1.0 - 1.0 / np.hypot(1.0, size),
+        )
+        kept = [i for i in range(len(fit.coordinates)) if i not in set(rows)]
+        own = [fit.coordinates[i] for i in kept]
+        residual, _ = found.residual(own, fit.position[kept])
+        return replace(found, least=float(residual @ residual))
+
+    def residual(self, coordinates: Sequence[Coordinate], position: Array) -> tuple[Array, list[Prediction]]:
+        """Whitened residuals (n,) of the calibration for coordinates of the machine, and its predictions."""
+        predicted = self._predicted(coordinates, position, (), None)
+        told = self.problem.whitened([p.temperature for p in predicted])
+        return self._counted(self.problem.data - told + self.offset), predicted
+
+    def slopes(self, coordinates: Sequence[Coordinate], position: Array, near: list[Prediction]) -> Array:
+        """Derivatives of :meth:`residual` by the coordinates, (n, p)."""
+        straight = self.problem.straight(())
+        known = {c.name for c in self.problem.belief.coordinates}
+        found = np.zeros((len(self.offset), len(coordinates)))
+        bent = []
+        for index, coordinate in enumerate(coordinates):
+            if coordinate.name in straight:
+                found[:, index] = coordinate.sigma * straight[coordinate.name]
+            elif coordinate.name in known and not coordinate.name.startswith(OF_ONE_RECORDING):
+                bent.append(index)
+        predicted = self._predicted(coordinates, position, bent, near)
+        found[:, bent] = self.problem.whitened([p.sensitivity for p in predicted])
+        return -self._counted(found)
+
+    def _predicted(
+        self,
+        coordinates: Sequence[Coordinate],
+        position: Array,
+        by: Sequence[int],
+        near: list[Prediction] | None,
+    ) -> list[Prediction]:
+        """Predictions of the calibration with what belongs to its recordings as it was fitted."""
+        kept = [i for i, c in enumerate(coordinates) if not c.name.startswith(OF_ONE_RECORDING)]
+        derived = [kept.index(i) for i in by]
+        shared = [coordinates[i] for i in kept]
+        return self.problem.predict((), shared, position[kept], by=derived, near=near, beside=self.own)
+
+    def _counted(self, values: Array) -> Array:
+        """Whitened values (n, ...) as they count: less where they may belong to one recording."""
+        rows = self.weight.reshape(-1, *([1] * (values.ndim - 1)))
+        values = rows * values
+        inside = self.modes.T @ values
+        less = self.share.reshape(-1, *([1] * (values.ndim - 1)))
+        return (values - self.modes @ (less * inside)) / tuned.INTERVAL_WIDENING
