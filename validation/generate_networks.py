@@ -293,11 +293,12 @@ def _write(
     effects, owner = [e for e, _ in drawn], case.owner
     network = owner.machine.network
     inputs = folder / "inputs" / name
+    # First: where it fails another machine is drawn, which must not find this one's files.
+    known = identify(case, effects, [v for _, v in drawn])
     rows = {"recording": write_run(rng, owner, run_with(owner, effects), inputs, "recording")}
     if case.calibration is not None:
         rows["calibration"] = write_run(rng, owner, case.calibration, inputs, "calibration")
     (inputs / "machine.toml").write_text(machine_text(owner, name), encoding="utf-8")
-    known = identify(case, effects, [v for _, v in drawn])
     sensors = list(owner.sensors.values())
     built = {f"capacity.{k}": v for k, v in network.capacity.items()}
     built |= {f"conductance.{k}": v for k, v in network.conductance.items()}
