@@ -30,6 +30,8 @@ from spindle_fem.inference.robust_size import huber, outlier_weight
 
 Array = NDArray[np.float64]
 
+# Errors of what cannot be simulated: a share above one, a runaway.
+NOT_SIMULATED = (ConvergenceError, OutOfValidityError, SpecError)
 # Steps of a fit at most.
 MOST_ITERATIONS = 30
 # An exact fit ends with a step that lowers the misfit by less than this share: rounding comes next.
@@ -270,8 +272,8 @@ class Problem:
                     continue
                 try:
                     trial = objective.at(point.position + move, slopes.predicted_after(move))
-                except (ConvergenceError, OutOfValidityError, SpecError):
-                    # Outside what can be simulated (a share above one, a runaway): a shorter step.
+                except NOT_SIMULATED:
+                    # A shorter step.
                     trial = None
                 if trial is not None and trial.cost < point.cost - 1e-9:
                     gain = point.cost - trial.cost

@@ -19,14 +19,13 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
-from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun, Variant, variants_of
 from spindle_fem.inference.coordinate_names import NO_VALUES
 from spindle_fem.inference.diagnosis import overlapping_components
 from spindle_fem.inference.further_tests import Place, network_places, reachable_places
 from spindle_fem.inference.heldout import heldout_stamps
-from spindle_fem.inference.hypothesis_fit import Problem, candidate_coordinates
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Problem, candidate_coordinates
 from spindle_fem.inference.misdescription_columns import (
     direction_columns,
     misdescriptions_of,
@@ -240,7 +239,7 @@ def plan_measurement(
         progress(f"plan: {schedule.name}")
         try:
             own = _products(problem, number, variants)
-        except (ConvergenceError, OutOfValidityError, SpecError) as error:
+        except NOT_SIMULATED as error:
             failed.append((schedule.name, str(error)))
             continue
         tests.append(judged(own, read, schedule.name, schedule.name, schedule.quantity))

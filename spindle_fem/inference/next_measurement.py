@@ -21,7 +21,6 @@ from scipy.linalg import solve_triangular
 
 from spindle_fem.effects.framework.effect import in_intervals, place_words
 from spindle_fem.effects.registry import effect_of
-from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.further_tests import (
     AGAIN,
@@ -34,7 +33,7 @@ from spindle_fem.inference.further_tests import (
     reachable_places,
     trials_of,
 )
-from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.verdict import Ranked, rank
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -216,7 +215,7 @@ def evaluate(
         try:
             known: list[Array] = []
             answers = [answer(predictor, fit, trial, places, spacing, known) for fit in fits]
-        except (ConvergenceError, OutOfValidityError, SpecError) as error:
+        except NOT_SIMULATED as error:
             failed.append({"condition": trial.name, "reason": str(error)})
             continue
         noise = [

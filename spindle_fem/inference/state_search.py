@@ -15,7 +15,6 @@ import numpy as np
 
 from spindle_fem.effects.framework.effect import Candidate, IntervalEffect
 from spindle_fem.effects.framework.unrecorded import STATES
-from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.hidden_states import (
@@ -26,7 +25,7 @@ from spindle_fem.inference.hidden_states import (
     without,
 )
 from spindle_fem.inference.hypothesis import Hypothesis, identity
-from spindle_fem.inference.hypothesis_fit import Fit, Problem, amplitude_name
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem, amplitude_name
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.missing_heat import Pattern
 from spindle_fem.inference.switching_model import QUICK, THOROUGH, Chain, Course, ReadingFilter, find_course
@@ -192,7 +191,19 @@ def _simulated(search: Search, candidates: tuple[Candidate, ...], values: Mappin
     """A fit; None where the set cannot be simulated."""
     try:
         return search.problem.fit(candidates, values)
-    except (ConvergenceError, OutOfValidityError, SpecError):
+    except NOT_SIMULATED:
+        return None
+
+
+def _about(
+    problem: Problem, fit: Fit, number: int, candidate: Candidate, *, everything: bool = False
+) -> tuple[BaseRun, ReadingFilter] | None:
+    """Run of a fit without a candidate, and what that leaves; None where nothing else can be simulated."""
+    rest, values = without(fit, candidate)
+    try:
+        base = BaseRun(problem.predictor, number, values, rest)
+        return base, ReadingFilter(readings_about(problem, fit, number, candidate, everything=everything))
+    except NOT_SIMULATED:
         return None
 
 
@@ -205,10 +216,11 @@ def _settle_intervals(search: Search, fit: Fit, candidate: Candidate) -> None:
         # A level may change at more places than those that may switch.
         return
     place = places[wanted]
-    rest, values = without(fit, candidate)
-    base = BaseRun(search.problem.predictor, number, values, rest)
-    readings = ReadingFilter(readings_about(search.problem, fit, number, candidate))
-    best = max(_courses(search, base, readings, place), key=lambda course: course.log_evidence, default=None)
+    rest, _ = without(fit, candidate)
+    about = _about(search.problem, fit, number, candidate)
+    if about is None:
+        return
+    best = max(_courses(search, *about, place), key=lambda course: course.log_evidence, default=None)
     if best is not None:
         settle(search, fit, place, best, candidate)
         # Laws may have compensated for parts of the state that the intervals miss.
@@ -223,16 +235,16 @@ def _twin(
 
     ``least`` is the evidence from which it is worth a fit.
     """
-    rest, values = without(fit, candidate)
-    base = BaseRun(search.problem.predictor, place.recording, values, rest)
-    readings = ReadingFilter(readings_about(search.problem, fit, place.recording, candidate))
+    about = _about(search.problem, fit, place.recording, candidate)
+    if about is None:
+        return None
     found = [
         (course.log_evidence, other, course)
         for other in state_places(search)
         if other.effect != place.effect
         and other.recording == place.recording
         and set(other.pattern.places) & set(place.pattern.places)
-        for course in _courses(search, base, readings, other)
+        for course in _courses(search, *about, other)
     ]
     best = max(found, key=lambda item: item[0], default=None)
     return None if best is None or best[0] < least else best[1:]
@@ -299,10 +311,10 @@ def course_about(
     everything: bool = False,
 ) -> Course | None:
     """The course again, about a fit that holds one already."""
-    problem = search.problem
-    rest, values = without(fit, candidate)
-    base = BaseRun(problem.predictor, place.recording, values, rest)
-    readings = ReadingFilter(readings_about(problem, fit, place.recording, candidate, everything=everything))
+    about = _about(search.problem, fit, place.recording, candidate, everything=everything)
+    if about is None:
+        return None
+    base, readings = about
     usual = _usual(search, place)
     size = fit.values[amplitude_name(candidate)] * fit.values.get(candidate.sized_by, 1.0)
     chain = best_chain(base, course.chain, course)

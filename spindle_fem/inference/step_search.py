@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.effect import Candidate, IntervalEffect
 from spindle_fem.effects.framework.unrecorded import PULSES, STEPS
 from spindle_fem.effects.registry import fixed
-from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.change_points import NOTHING, SHORTEST, choice, find_changes, levels_over_lowest
 from spindle_fem.inference.hypothesis import Hypothesis, identity
-from spindle_fem.inference.hypothesis_fit import Fit, Problem, amplitude_name
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem, amplitude_name
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.missing_heat import Onsets, Pattern, onset_answers
 from spindle_fem.inference.prepared_problem import slow_error_of
@@ -250,7 +249,7 @@ def _fitted(
     candidates = (*fit.candidates, candidate)
     try:
         fitted = problem.fit(candidates, start | {amplitude_name(candidate): size}, hopeless=hopeless)
-    except (ConvergenceError, OutOfValidityError, SpecError):
+    except NOT_SIMULATED:
         return None
     return Hypothesis(fitted, search.log_prior(candidates) - _paid(problem, place, intervals))
 

@@ -8,8 +8,7 @@ from functools import partial
 from typing import Any
 
 from spindle_fem.effects.framework.effect import Candidate
-from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
-from spindle_fem.inference.hypothesis_fit import MOST_ITERATIONS, Fit, Problem, amplitude_name
+from spindle_fem.inference.hypothesis_fit import MOST_ITERATIONS, NOT_SIMULATED, Fit, Problem, amplitude_name
 from spindle_fem.parallel import Shared, WorkerPool
 
 
@@ -44,7 +43,7 @@ def fit_order(problem: Problem, order: FitOrder) -> Fit | None:
                 values[name] = candidate.null + share * (values[name] - candidate.null)
         try:
             return problem.fit(order.candidates, values, iterations=order.iterations, hopeless=order.hopeless)
-        except (ConvergenceError, OutOfValidityError, SpecError):
+        except NOT_SIMULATED:
             continue
     return None
 

@@ -53,6 +53,13 @@ def test_its_own_check_is_within_what_was_asked(fast):
     assert fast.model.size <= ReductionOptions().largest
 
 
+@pytest.mark.slow
+def test_what_a_check_misses_is_solved_as_closely_as_the_probes_ask(machine):
+    """What joins a basis by its energy alone leaves some probes a thousandth of a kelvin off."""
+    options = ReductionOptions(samples=1, checks=1, error=5e-4)
+    assert building.build_reduced_model(machine, options).model.errors["probes"] <= options.error
+
+
 def test_every_operator_conserves_heat(machine):
     on_mesh = build_mesh_model(machine)
     one = np.ones(on_mesh.size)

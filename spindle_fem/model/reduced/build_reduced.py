@@ -96,8 +96,8 @@ SOLUTION_ERROR = 1.0e-3
 CHECK_TOLERANCE = 0.02
 # Relative tolerance when another machine's basis is tried, whose error is rarely close to the limit.
 CHECK_OF_NEAR = 0.1
-# Rounds of checks in which such a basis grows; then it gets snapshots as any.
-ROUNDS_OF_NEAR = 2
+# Rounds of checks in which a basis grows; in those of the second number another machine's, without snapshots.
+ROUNDS, ROUNDS_OF_NEAR = 5, 2
 # Steps of the series in the change of one contact that the basis holds, and the share of its conductance
 # that is left where all contacts of a group have opened.
 CONTACT_ORDERS, OPENED = 2, 0.05
@@ -259,7 +259,7 @@ def build_reduced_model(
     Raises
     ------
     ConvergenceError
-        The checks still err after three rounds with snapshots.
+        The checks still err after ``ROUNDS`` with snapshots.
     """
     chosen = options or ReductionOptions()
     spec = machine.spec
@@ -274,7 +274,7 @@ def build_reduced_model(
         progress("reduced model: snapshots")
         _add_snapshots(grown, sampler, nominal, wanted)
     seed = 2
-    for attempt in range(3 if near is None else 3 + ROUNDS_OF_NEAR):
+    for attempt in range(ROUNDS if near is None else ROUNDS + ROUNDS_OF_NEAR):
         if near is not None and attempt == ROUNDS_OF_NEAR:
             progress("reduced model: snapshots")
             _add_snapshots(grown, sampler, nominal, wanted)
@@ -294,7 +294,8 @@ def build_reduced_model(
             errors = {"probes": _largest(full.probes @ missing), "places": _largest(full.places @ missing)}
             worst = {key: max(value, errors[key]) for key, value in worst.items()}
             if errors["probes"] > chosen.error:
-                grown.enrich(sample, loads, SHIFTS, wanted)
+                # What was good enough in the energy norm was not at the probes of this machine.
+                grown.enrich(sample, loads, SHIFTS, wanted * chosen.error / errors["probes"])
         seed += 100
         if worst["probes"] <= chosen.error:
             own = {"digest": reduced_digest(spec, chosen.key(spec)), "ranges": sampler.ranges()}
