@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from scipy.sparse.linalg import splu, spsolve
 
 from spindle_fem.commands.simulate_command import simulate_machine
+from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.search_basis import on_search_basis
@@ -27,6 +29,7 @@ from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
 from spindle_fem.solvers.prepared_machine import prepare_machine
 
+ROOT = Path(__file__).parents[2]
 RPM = np.pi / 30.0
 OVERRIDES = ("mesh.preset=coarse", "mesh.order=1")
 HELD = np.array([True, True, False, False, True])
@@ -54,10 +57,11 @@ def test_its_own_check_is_within_what_was_asked(fast):
 
 
 @pytest.mark.slow
-def test_what_a_check_misses_is_solved_as_closely_as_the_probes_ask(machine):
-    """What joins a basis by its energy alone leaves some probes a thousandth of a kelvin off."""
-    options = ReductionOptions(samples=1, checks=1, error=5e-4)
-    assert building.build_reduced_model(machine, options).model.errors["probes"] <= options.error
+def test_what_a_check_misses_is_solved_as_closely_as_the_probes_ask(monkeypatch, tmp_path):
+    """What joins the basis of this small spindle by its energy alone leaves a probe 7 mK off."""
+    monkeypatch.setenv("SPINDLE_FEM_CACHE", str(tmp_path))
+    small = load_machine(ROOT / "validation" / "hardening" / "spindle.toml", OVERRIDES[:1])
+    assert fast_model_for(small, []).model.errors["probes"] <= ReductionOptions().error
 
 
 def test_every_operator_conserves_heat(machine):
