@@ -296,7 +296,7 @@ def sensor(candidates, effect):
 def test_a_sensor_offset_has_the_evidence_of_its_exact_gaussian(blank, candidates, tmp_path, monkeypatch):
     """An offset is linear: with the machine fixed, data are exactly Gaussian."""
     # Gaussian tails: nothing is an outlier.
-    monkeypatch.setattr("spindle_fem.inference.hypothesis_fit.OUTLIER_SIGMAS", 1e9)
+    monkeypatch.setattr("spindle_fem.inference.robust_size.OUTLIER_SIGMAS", 1e9)
     offset = sensor(candidates, "sensor_offset")
     predictor = synthetic(blank, tmp_path, 5, {offset.amplitude: 0.06}, (offset,))
     nothing = Belief.prior(())
