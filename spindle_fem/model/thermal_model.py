@@ -62,6 +62,11 @@ class ThermalModel:
     probe_gradients : (n_q, 2, n) ndarray, [1/m]
         Change of each reading with a displacement of the probe along r and
         along z; where sparse, the (2 n_q, n) rows of the same.
+    probe_spins : (n_q,) ndarray, [µm s²]
+        What a reading gains by rotation, for each (rad/s)²; empty where none does.
+    ring_shifts : (4 n_bearings, n) matrix, [µm/K]
+        What temperature does to the rings of every bearing, as ``SeatBodies.law`` takes it; empty where no
+        elastic bodies carry them.
     cell_film : (n_cells) matrices (n, n), [m²]
         Unit film of each coolant cell.
     cell_load : (n_cells, n) matrix, [m²]
@@ -99,6 +104,8 @@ class ThermalModel:
     probes: Matrix
     one: Array
     probe_gradients: Matrix = field(default_factory=lambda: np.zeros((0, 2, 0)))
+    probe_spins: Array = field(default_factory=lambda: np.zeros(0))
+    ring_shifts: Matrix = field(default_factory=lambda: np.zeros((0, 0)))
     cell_film: Matrices = field(default_factory=lambda: np.zeros((0, 0, 0)))
     cell_load: Matrix = field(default_factory=lambda: np.zeros((0, 0)))
     cell_area: Array = field(default_factory=lambda: np.zeros((1, 0)))
@@ -189,6 +196,9 @@ def project(model: ThermalModel, basis: Array, one: Array) -> ThermalModel:
         "probe_gradients": _dense(model.probe_gradients @ basis).reshape(-1, 2, size)
         if model.probe_gradients.shape[0]
         else np.zeros((0, 2, size)),
+        "ring_shifts": _dense(model.ring_shifts @ basis)
+        if model.ring_shifts.shape[0]
+        else np.zeros((0, size)),
         "cell_load": np.asarray(model.cell_load @ basis) if model.cell_area.size else np.zeros((0, size)),
         "n_full": model.n_full or model.size,
         "nodes": (basis.T @ model.nodes).astype(np.float32) if model.nodes.size else model.nodes,

@@ -434,7 +434,7 @@ def require_known(
     """
     for term in terms:
         for names, verb, known in (
-            (term.reads, "reads", places),
+            ([name for name in term.reads if name not in term.combined], "reads", places),
             (term.heat_places, "puts heat into", (*places, *fluids)),
             (term.bearings, "scales the friction of", bearings),
             (term.coefficients, "scales", coefficients),

@@ -61,6 +61,11 @@ class SeatJoints:
                     value = float(seat_conductance(pressure, radial_gap=gap, **surfaces))
                     self._joints[contact] = _Joint(bearing, side, surfaces, value)
 
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Contacts that follow their fits."""
+        return tuple(self._joints)
+
     def factors(self, heats: Mapping[str, BearingHeat]) -> dict[str, float]:
         """Factor on the conductance of every such joint, by its coefficient's name."""
         found = {}

@@ -18,13 +18,14 @@ from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.inference.calibration import Calibration, prediction_interval
 from spindle_fem.inference.calibration import calibrate as fit_parameters
 from spindle_fem.inference.coordinate_names import START_PREFIX
+from spindle_fem.inference.followed_model import with_followed_preload
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.model.lumped.written_network import build_network, value_in_definition
 from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for, options_for, recentred_model
-from spindle_fem.operation.bearing_heat import without_unasked_preload
+from spindle_fem.operation.bearing_heat import at_assembly_size
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import Comparison, compare
 from spindle_fem.recordings.displaced_readings import with_displacements
@@ -99,9 +100,13 @@ def simulate_recordings(
 def _simulate_geometry(
     spec: MachineSpec, recording: Recording, calibration: Sequence[Recording], progress: Progress
 ) -> Simulation:
-    followed, (spec, left_out) = spec, without_unasked_preload(spec)
-    fast = fast_model_for(spec, (recording, *calibration), as_given=not calibration, progress=progress)
+    followed, spec = spec, at_assembly_size(spec)
+    recordings = (recording, *calibration)
+    fast = fast_model_for(spec, recordings, as_given=not calibration, progress=progress)
     effects = effects_on(spec.effects, fast, recording)
+    error = None
+    if followed.follows_preload:
+        fast, error = with_followed_preload(followed, fast, recordings, effects, progress=progress)
     result = None
     if calibration:
         told = [with_displacements(item) for item in calibration]
@@ -112,12 +117,12 @@ def _simulate_geometry(
     outside = _outside_range(predictor, factors)
     if outside:
         progress("reduced model: outside its range, made anew")
-        fast = recentred_model(fast, factors, options_for(spec, (recording, *calibration)), progress)
+        fast = recentred_model(fast, factors, options_for(spec, recordings), progress)
         predictor = Predictor(fast, [recording], effects=effects, at_stamps=True)
         outside = _outside_range(predictor, factors)
     progress("simulation")
     predicted, half_width = _prediction(predictor, result)
-    notes = [*left_out, *predictor.drives[0].notes, *_effect_notes(effects)]
+    notes = [*predictor.drives[0].notes, *_effect_notes(effects)]
     if fast.inputs.extra_terms:
         what = (
             "ball contacts"
@@ -125,6 +130,11 @@ def _simulate_geometry(
             else f'"{spec.heat.model}" friction and ball contacts'
         )
         notes.append(f"{what} from a map over speed, thrust and film temperature")
+    if error is not None:
+        notes.append(
+            "preload follows the temperatures, by bearing mechanics at sampled states of this run; "
+            f"between them friction errs by {100.0 * error:.2g} % at most"
+        )
     if outside:
         notes.append(_beyond_words(outside))
     if len(recording.segments) > 1:

@@ -50,6 +50,13 @@ class Operating(Protocol):
     coolant_flow: float
 
 
+class ReadModel(Protocol):
+    """A model whose places can be read."""
+
+    def place(self, name: str) -> Array:
+        """Mean over a place, (n,)."""
+
+
 @dataclass(frozen=True, slots=True)
 class TermParameter:
     """One parameter of a term.
@@ -115,6 +122,8 @@ class Term:
         Bearings (sources of a network) whose friction heat :meth:`friction` multiplies.
     reads : tuple of str
         Places whose mean temperatures it needs.
+    combined : tuple of str
+        Those of ``reads`` that are no places: sums over the unknowns, as :meth:`read_row` gives them.
     n_states : int
         Numbers that it remembers from step to step.
     follows : tuple of str
@@ -127,6 +136,7 @@ class Term:
     coefficients: tuple[str, ...] = ()
     bearings: tuple[str, ...] = ()
     reads: tuple[str, ...] = ()
+    combined: tuple[str, ...] = ()
     n_states: int = 0
     follows: tuple[str, ...] = ()
 
@@ -163,6 +173,10 @@ class Term:
         return {}
 
     # -------------------------------------------------------------- helpers
+    def read_row(self, model: ReadModel, name: str) -> Array:
+        """What one of ``reads`` is of a model's unknowns, (n,)."""
+        return model.place(name)
+
     def names(self) -> dict[str, TermParameter]:
         """Parameters by the names that they have outside."""
         return {f"{self.name}.{item.name}": item for item in self.parameters}

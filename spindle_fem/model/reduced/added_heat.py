@@ -151,7 +151,7 @@ class AddedHeat:
         self.terms = EffectTerms(
             terms, parameters, derivatives, sum(len(spectrum) for _, spectrum in directions)
         )
-        rows = [model.place(name) for name in self.terms.reads]
+        rows = [term.read_row(model, name) for term in terms for name in term.reads]
         rows += [vector for vectors, _ in directions for vector in vectors.T]
         self.sense = np.array(rows).reshape(-1, model.size)
         # Places whose heat is a shift of a film's fluid, in K: position and film.

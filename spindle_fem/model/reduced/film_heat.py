@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import HeatTable, MachineSpec
 from spindle_fem.effects.framework.term import Operating, Term, TermContext
 from spindle_fem.model.reduced.build_reduced import ReductionOptions
+from spindle_fem.model.reduced.followed_preload import FollowedPreload
+from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.friction_map import (
     CONDUCTANCES,
     FILM_TEMPERATURES,
@@ -41,6 +43,8 @@ class FilmHeat(Term):
     ----------
     table : MachineSpec
         As :func:`tabulated_machine` makes it of the machine and the map.
+    preload : FollowedPreload, optional
+        What expansion does to the bearings and the joints of their rings; they keep their size without it.
 
     Attributes
     ----------
@@ -50,8 +54,14 @@ class FilmHeat(Term):
 
     name = "film_heat"
 
-    def __init__(self, friction_map: FrictionMap, machine: MachineSpec, table: MachineSpec) -> None:
-        self.friction_map = friction_map
+    def __init__(
+        self,
+        friction_map: FrictionMap,
+        machine: MachineSpec,
+        table: MachineSpec,
+        preload: FollowedPreload | None = None,
+    ) -> None:
+        self.friction_map, self.machine, self.preload = friction_map, machine, preload
         names = friction_map.bearings
         # Heat that is given by table stays as it is, and so do ball rows of constant conductance.
         self.bearings = () if machine.heat.model == "table" else names
@@ -62,6 +72,9 @@ class FilmHeat(Term):
         self._table = np.array([table.heat.table.heat[name] for name in names])
         self._conductance = np.array([group.ball_row.conductance.value for group, _ in table.bearings])
         self.heat_places = tuple(self.reads[3 * row + side] for row in self.follow for side in range(3))
+        if preload is not None:
+            self.combined, self.coefficients = preload.reads, preload.joints
+            self.reads += self.combined
         self._known: dict[tuple[float, float], tuple[FilmSeries, Array]] = {}
 
     def _points(self, context: TermContext) -> Iterator[tuple[slice | NDArray[np.int64], float, float]]:
@@ -87,8 +100,28 @@ class FilmHeat(Term):
 
     def _film(self, context: TermContext) -> tuple[NDArray, NDArray]:
         """Temperatures by bearing and side, and of the film."""
-        by_bearing = context.temperatures.reshape(len(self._table), 3, -1)
+        by_bearing = context.temperatures[: 3 * len(self._table)].reshape(len(self._table), 3, -1)
         return by_bearing, film_temperature(by_bearing[:, 0], by_bearing[:, 1], by_bearing[:, 2])
+
+    def with_preload(self, preload: FollowedPreload, table: MachineSpec) -> FilmHeat:
+        """The term with bearings that follow expansion."""
+        return FilmHeat(self.friction_map, self.machine, table, preload)
+
+    def read_row(self, model: ThermalModel, name: str) -> Array:
+        """Coordinates of the bearings' states, beside places."""
+        if self.preload is not None and name in self.combined:
+            return self.preload.read_row(model, name)
+        return model.place(name)
+
+    def _quantities(self, context: TermContext) -> NDArray:
+        """What expansion does at the state of the moment, as the preload has it."""
+        return self.preload.quantities(context.temperatures[3 * len(self._table) :], context)
+
+    def factor(self, context: TermContext) -> NDArray[np.complex128]:
+        """Factor on the conductance of every joint that follows its fit, (n_joints, k)."""
+        if self.preload is None:
+            return super().factor(context)
+        return np.exp(self.preload.of_joints(self._quantities(context)))
 
     def friction(self, context: TermContext) -> NDArray[np.complex128]:
         """Heat of the map over that of the table; 1 at standstill."""
@@ -100,15 +133,21 @@ class FilmHeat(Term):
             moment = self._series(speed, thrust)[0].at(film[:, columns], MOMENT)[:, 0]
             tabulated = np.array([np.interp(speed, self._grid, row) for row in self._table])
             found[:, columns] = np.exp(moment + np.log(speed / tabulated)[:, None])
+        if self.preload is not None:
+            found = found * np.exp(self.preload.logarithms(self._quantities(context))[:, 0])
         return found[: len(self.bearings)]
 
     def heat(self, context: TermContext) -> NDArray[np.complex128]:
         """Heat between balls and raceways beyond that with a film at 30 °C."""
         temperatures, film = self._film(context)
-        more = np.empty((len(film), 2, film.shape[1]), dtype=film.dtype)
+        grown = np.zeros((len(film), 2, film.shape[1]), dtype=film.dtype)
+        if self.preload is not None:
+            grown += self.preload.logarithms(self._quantities(context))[:, CONDUCTANCES]
+        more = np.empty_like(grown)
         for columns, speed, thrust in self._points(context):
             series, nominal = self._series(speed, thrust)
-            more[:, :, columns] = np.exp(series.at(film[:, columns], CONDUCTANCES)) - nominal[:, :, None]
+            now = series.at(film[:, columns], CONDUCTANCES) + grown[:, :, columns]
+            more[:, :, columns] = np.exp(now) - nominal[:, :, None]
         flow = more * (temperatures[:, 2:] - temperatures[:, :2])
         found = np.concatenate((flow, -flow.sum(axis=1, keepdims=True)), axis=1)
         return found[self.follow].reshape(len(self.heat_places), -1)

@@ -381,6 +381,8 @@ def in_solving_order(full: MeshModel) -> MeshModel:
 
     changed = {name: tuple(map(turned, getattr(full, name))) for name in MATRIX_FIELDS}
     changed |= {name: columns(getattr(full, name)) for name in ("places", "probes", "probe_gradients")}
+    if full.ring_shifts.shape[0]:
+        changed["ring_shifts"] = columns(full.ring_shifts)
     if full.cell_area.size:
         changed["cell_load"] = columns(full.cell_load)
     if full.prolongation is not None:

@@ -16,6 +16,7 @@ from scipy import sparse
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import SpecError
+from spindle_fem.model.elastic.machine_bodies import carries_rings
 from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.model.mesh.equations import ThermalSystem
 from spindle_fem.model.mesh.evaluate import probe_matrix
@@ -95,10 +96,18 @@ def build_mesh_model(machine: PreparedMachine) -> MeshModel:
     rows = _widened(probe_matrix(operators, probe_positions(points), [p.part for p in points]), size)
     gradients = _widened(probe_slopes(operators, points), size)
     sensors = [sensor.name for sensor in spec.displacement_sensor]
-    if sensors:
-        growth = GrowthModel(spec, operators.mesh, operators.order).sensor_rows[0]
-        rows = sparse.vstack([rows, _widened(sparse.csr_array(MICROMETRES * growth), size)], format="csr")
-        gradients = sparse.vstack([gradients, sparse.csr_array((2 * len(sensors), size))], format="csr")
+    growing: dict[str, object] = {}
+    if sensors or (carries_rings(spec) and any(group.fit for group in spec.bearing_set)):
+        growth = machine.growth or GrowthModel(spec, operators.mesh, operators.order)
+        if sensors:
+            seen, spins = growth.sensor_rows
+            rows = sparse.vstack([rows, _micrometres(seen, size)], format="csr")
+            gradients = sparse.vstack([gradients, sparse.csr_array((2 * len(sensors), size))], format="csr")
+            growing["probe_spins"] = MICROMETRES * np.append(np.zeros(len(points)), spins)
+        if growth.bearings:
+            own = [growth.bearings.index(bearing.name) for _, bearing in spec.bearings]
+            shifts = growth.thermal_rows[own].reshape(4 * len(own), -1)
+            growing["ring_shifts"] = _micrometres(shifts, size)
     channel = {} if machine.builder.cells is None else _channel(machine, size)
     return MeshModel(
         coefficient_names=tuple(coefficients),
@@ -117,6 +126,7 @@ def build_mesh_model(machine: PreparedMachine) -> MeshModel:
         gap_radii=gap_radii_of(spec, operators),
         n_unknowns=operators.n_unknowns,
         prolongation=operators.prolongation,
+        **growing,
         **channel,
     )
 
@@ -158,6 +168,11 @@ def _padded(matrix: sparse.csr_array, size: int) -> sparse.csr_array:
 def _widened(rows: sparse.csr_array, size: int) -> sparse.csr_array:
     """Rows over the mesh's unknowns extended over the lumped nodes."""
     return sparse.csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], size))
+
+
+def _micrometres(rows: Array, size: int) -> sparse.csr_array:
+    """Displacements [m/K] by temperatures of the mesh as µm/K over all unknowns."""
+    return _widened(sparse.csr_array(MICROMETRES * rows), size)
 
 
 def _lumped_nodes(machine: PreparedMachine) -> list[tuple[str, dict[str, Pieces]]]:
