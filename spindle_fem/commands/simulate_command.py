@@ -110,6 +110,11 @@ def write_simulation(simulation: Simulation, folder: Path, *, started: float) ->
         entry["interval_half_width_K"] = float(np.mean(simulation.half_width[:, index]))
     if recording.displacement_names and simulation.displacements.size:
         summary["displacements"] = displacement_errors(recording, simulation.displacements)
+    if simulation.preload:
+        summary["preload_N"] = {
+            name: {"least": float(values.min()), "most": float(values.max()), "last": float(values[-1])}
+            for name, values in simulation.preload.items()
+        }
     summary |= {
         "recording": recording.name,
         "notes": list(simulation.notes),

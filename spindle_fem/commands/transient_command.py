@@ -23,7 +23,7 @@ from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machin
 from spindle_fem.solvers.saved_state import load_state, save_state
 from spindle_fem.studies.shipped_files import find_study
 from spindle_fem.studies.transient_study import StudyResult, TransientStudy, load_study, run_study
-from spindle_fem.studies.transient_summary import summarise
+from spindle_fem.studies.transient_summary import motion_key, summarise
 from spindle_fem.units import ZERO_CELSIUS_K
 
 FIELDS = "fields.vtkhdf"
@@ -111,11 +111,13 @@ def _write_table(result: StudyResult, path: Path) -> None:
         "time_s",
         *(f"{name}_degC" for name in first.probes),
         *(f"{name}_{part}_degC" for name in first.bearings for part in ("inner", "outer", "balls")),
+        *(motion_key(name) for name in first.motions),
     ]
     parts = np.stack([result.joined(name) for name in ("inner", "outer", "balls")], axis=2)
     temperatures = np.hstack((result.joined("readings"), parts.reshape(len(parts), -1))) - ZERO_CELSIUS_K
+    values = np.hstack((temperatures, 1.0e6 * result.joined("motion")))
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
-        for time, row in zip(result.joined("times"), temperatures, strict=True):
+        for time, row in zip(result.joined("times"), values, strict=True):
             writer.writerow([f"{time:.6g}", *(f"{value:.4f}" for value in row)])

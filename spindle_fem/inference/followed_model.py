@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.inference.predictor import Predictor
@@ -14,6 +15,8 @@ from spindle_fem.model.reduced.film_heat import FilmHeat
 from spindle_fem.model.reduced.followed_preload import FollowedPreload, MountedRun, sample_preload
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
 
 
 def with_followed_preload(
@@ -54,6 +57,19 @@ def with_followed_preload(
 
     preload, error = sample_preload(spec, fast.model, plain.friction_map, march, progress)
     return followed(preload), error
+
+
+def preload_along(predictor: Predictor, number: int, factors: Mapping[str, float]) -> dict[str, Array]:
+    """Preload of every bearing along one recording, (2 G,) N each; empty where bearings keep their size.
+
+    At the starts of all steps, then at their ends.
+    """
+    terms = (term for term in predictor.fast.inputs.extra_terms if isinstance(term, FilmHeat))
+    preload = next((term.preload for term in terms if term.preload is not None), None)
+    if preload is None:
+        return {}
+    found = preload.preload(predictor.fast.model, _run(predictor, number, factors))
+    return dict(zip(predictor.fast.bearings, found.T, strict=True))
 
 
 def _run(predictor: Predictor, number: int, factors: Mapping[str, float]) -> MountedRun:

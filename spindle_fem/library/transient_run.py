@@ -43,6 +43,11 @@ class TransientRun(FolderResult):
         }
         for name in ("inner", "outer", "balls"):
             variables[name] = (by_bearing, study.joined(name) - ZERO_CELSIUS_K, celsius)
+        coordinates = {}
+        if first.motions:
+            motions = {"units": "m", "long_name": "since assembly; tilts in rad"}
+            variables["motion"] = (("time", "motion_name"), study.joined("motion"), motions)
+            coordinates = {"motion_name": list(first.motions)}
         for name in ("hottest", "coldest"):
             variables[name] = ("step", study.step_record(name) - ZERO_CELSIUS_K, celsius)
         for name, unit in (("bearing_heat", "W"), ("preload", "N")):
@@ -55,6 +60,7 @@ class TransientRun(FolderResult):
                 "step": ("step", study.step_record("times"), {"units": "s", "long_name": "end of the step"}),
                 "probe": list(first.probes),
                 "bearing": list(first.bearings),
+                **coordinates,
             },
             {"machine": self["machine"], "study": self["study"]},
         )
@@ -75,6 +81,10 @@ class TransientRun(FolderResult):
     def plot_heat(self) -> Figure:
         """Friction heat, what the coolant takes, and preload where it changes."""
         return transient_charts.heat_history(self.study)
+
+    def plot_growth(self) -> Figure | None:
+        """Shift of the nose and readings of displacement sensors; None where no elastic bodies are known."""
+        return transient_charts.growth_history(self.study)
 
     def _headline(self) -> str:
         hours = self["phases"][-1]["end_s"] / 3600.0

@@ -1,4 +1,4 @@
-"""Bearing sets at states of a machine that grows: what expansion does to friction, contacts, joints, preload."""
+"""Bearing sets of a machine that grows: friction, ball contacts, joints and preload at any state of it."""
 
 from __future__ import annotations
 
@@ -84,9 +84,9 @@ class MountedStates:
 
     # ------------------------------------------------------------------ states of a model
     def rows(self, model: ThermalModel) -> tuple[Array, Array]:
-        """States of all bearings from unknowns ``u``: ``rows @ u - offsets``, (n_bearings, width, n) and (.., width).
+        """Rows (n_bearings, width, n) and offsets (n_bearings, width): states are ``rows @ u - offsets``.
 
-        Temperatures in K, shifts in µm from the assembled state.
+        ``u`` are the unknowns of a model; temperatures in K, shifts in µm from the assembled state.
         """
         found = np.zeros((len(self._names), self.width, model.size))
         offsets = np.zeros((len(self._names), self.width))

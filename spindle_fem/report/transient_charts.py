@@ -24,6 +24,11 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 _RPM = 30.0 / np.pi
+_MOTION_WORDS = {
+    "nose_axial": "nose forward",
+    "nose_radial_up": "nose up",
+    "nose_radial_across": "nose across",
+}
 # Share of the preload by which it has to change to be drawn.
 SAME_PRELOAD = 1.0e-3
 
@@ -128,6 +133,25 @@ def heat_history(result: StudyResult) -> Figure:
             axes[1].plot(hours, preload[:, column], color=CYCLE[column % len(CYCLE)], label=name)
         axes[1].set_ylabel("preload / N")
         axes[1].legend(ncols=5)
+    return figure
+
+
+@styled
+def growth_history(result: StudyResult) -> Figure | None:
+    """Shift of the nose and readings of the displacement sensors since assembly; None without bodies."""
+    names = result.phases[0].transient.motions
+    shown = [column for column, name in enumerate(names) if "_tilt_" not in name]
+    if not shown:
+        return None
+    figure, (upper, lower) = _stacked(900.0, f"{result.study.name}: growth", (4.0, 1.0))
+    hours, motion = _hours(result.joined("times")), 1.0e6 * result.joined("motion")
+    for number, column in enumerate(shown):
+        label = _MOTION_WORDS.get(names[column], f"sensor {names[column]}")
+        upper.plot(hours, motion[:, column], color=CYCLE[number % len(CYCLE)], label=label)
+    _phase_ends(upper, result)
+    upper.set_ylabel("since assembly / µm")
+    upper.legend(ncols=3)
+    _speed_strip(lower, result)
     return figure
 
 

@@ -18,7 +18,13 @@ from spindle_fem.report.table_rows import (
     whole,
     words,
 )
-from spindle_fem.report.transient_charts import bearing_history, heat_history, probe_history, step_history
+from spindle_fem.report.transient_charts import (
+    bearing_history,
+    growth_history,
+    heat_history,
+    probe_history,
+    step_history,
+)
 from spindle_fem.results.output_folder import read_content, replace_text
 from spindle_fem.studies.transient_study import StudyResult
 from spindle_fem.studies.transient_summary import SCHEMA
@@ -29,6 +35,7 @@ CAPTIONS = {
     "bearings": "Raceway means of every bearing and how much hotter the inner ring is.",
     "heat": "Friction heat follows speed and grease temperature; "
     "the difference to the coolant is stored or lost to the air.",
+    "growth": "How far the nose has moved since assembly, and what displacement sensors read.",
     "steps": "Steps grow as the temperatures come to rest; the dashed line is the error asked for.",
 }
 
@@ -47,6 +54,7 @@ def write_transient_figures(summary: Mapping[str, Any], result: StudyResult, fol
         "probes": probe_history(result, summary["equilibrium"].get("steady_degC")),
         "bearings": bearing_history(result),
         "heat": heat_history(result),
+        "growth": growth_history(result),
         "steps": step_history(result),
     }
     place = folder / "figures"

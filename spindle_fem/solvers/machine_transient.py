@@ -264,6 +264,8 @@ class _Run:
             cpu_seconds=seconds,
             stopped=self.stopped,
             memory=None if source.terms is None else source.terms.memory,
+            motions=() if rows.motions is None else (*rows.motions.nose, *rows.motions.sensors),
+            motion=rows.displacements(outputs, times, source.coolant_at),
         )
 
     def _energy(self, account: EnergyAccount) -> MachineEnergy:

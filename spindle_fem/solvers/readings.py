@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from spindle_fem.model.elastic.machine_growth import Motions
 from spindle_fem.model.mesh.evaluate import mean_matrix, probe_matrix
 from spindle_fem.operation.circuits import CircuitMarch, stream_answer, wall_cells
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -25,7 +26,7 @@ class ReadingRows:
     Attributes
     ----------
     rows : (n_outputs, n + m) sparse array
-        Point probes, raceway means of every bearing, ball rows, walls of circuits, channel cells.
+        Point probes, raceway means of every bearing, ball rows, walls of circuits, motions, channel cells.
     probes : tuple of str
         In the order of the definition.
     """
@@ -35,6 +36,7 @@ class ReadingRows:
     probes: tuple[str, ...]
     bearings: tuple[str, ...]
     _points: tuple[str, ...]
+    motions: Motions | None = None
 
     @classmethod
     def of(cls, machine: PreparedMachine, lumped_names: tuple[str, ...]) -> ReadingRows:
@@ -61,10 +63,14 @@ class ReadingRows:
         if spec.circuits:
             walls = [name for film in spec.circuits for name in film.surface]
             blocks.append(_widened(mean_matrix(operators, walls), width))
+        motions = None if machine.growth is None else machine.growth.motions
+        if motions is not None:
+            blocks.append(_widened(sparse.csr_array(motions.rows), width))
         if machine.builder.cells is not None:
             blocks.append(_widened(_cell_means(machine), width))
         rows = sparse.csr_array(sparse.vstack(blocks)) if blocks else sparse.csr_array((0, width))
-        return cls(machine, rows, tuple(p.name for p in spec.probe), bearings, tuple(p.name for p in points))
+        probes = tuple(probe.name for probe in spec.probe)
+        return cls(machine, rows, probes, bearings, tuple(p.name for p in points), motions)
 
     def probe_readings(self, outputs: Array, times: Array, coolant_at: CoolantAt) -> Array:
         """Temperature of every probe, (n_times, n_probes) [K].
@@ -91,6 +97,15 @@ class ReadingRows:
         first, number = len(self._points), len(self.bearings)
         rings = outputs[:, first : first + 2 * number]
         return rings[:, 0::2], rings[:, 1::2], outputs[:, first + 2 * number : first + 3 * number]
+
+    def displacements(self, outputs: Array, times: Array, coolant_at: CoolantAt) -> Array:
+        """Motions of the nose and readings of displacement sensors since assembly, (n_times, k) m and rad."""
+        if self.motions is None:
+            return np.zeros((len(times), 0))
+        cells = self.machine.builder.cells
+        end = outputs.shape[1] - (0 if cells is None else cells.cell_area.size)
+        speed = np.array([coolant_at(float(time))[0].speed for time in times])
+        return self.motions.at(outputs[:, end - len(self.motions.rows) : end], speed)
 
     def _circuit_outlet(self, outputs: Array, times: Array, coolant_at: CoolantAt, name: str) -> Array:
         """Outlet of a circuit, its films those of the definition: (n_times,) K."""

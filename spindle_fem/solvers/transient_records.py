@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
@@ -199,6 +199,10 @@ class MachineTransient:
         Whether the stop condition ended it, not the end time.
     memory : ndarray or None
         What terms remember at the end.
+    motions : tuple of str
+        Of the nose (``nose_axial``, ...), then displacement sensors; none without elastic bodies.
+    motion : (n, n_motions) ndarray, [m], tilts in [rad]
+        Since assembly.
     """
 
     times: Array
@@ -215,6 +219,8 @@ class MachineTransient:
     cpu_seconds: float
     stopped: bool = False
     memory: Array | None = None
+    motions: tuple[str, ...] = ()
+    motion: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def reading(self, probe: str) -> Array:
         """Readings of one probe, (n,) [K]."""

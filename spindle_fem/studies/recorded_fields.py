@@ -22,7 +22,6 @@ from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.mesh.evaluate import temperature_at_nodes
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.model.reduced.defined_effects import physics_of
-from spindle_fem.operation.bearing_heat import without_unasked_preload
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_transient import Watch, simulate_full, start_at
@@ -83,8 +82,6 @@ def fields_of_recording(
     RecordingError
         The inputs change too often for the full model to follow within a minute or so.
     """
-    # as the fast model has it, whose readings stand beside these fields
-    spec, _ = without_unasked_preload(spec)
     history = OperatingHistory.of(spec, inputs)
     steps = len(history.breakpoints(OPTIONS.input_resolution))
     if steps > MOST_STEPS:

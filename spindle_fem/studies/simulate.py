@@ -18,7 +18,7 @@ from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.inference.calibration import Calibration, prediction_interval
 from spindle_fem.inference.calibration import calibrate as fit_parameters
 from spindle_fem.inference.coordinate_names import START_PREFIX
-from spindle_fem.inference.followed_model import with_followed_preload
+from spindle_fem.inference.followed_model import preload_along, with_followed_preload
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.model.lumped.written_network import build_network, value_in_definition
@@ -51,6 +51,8 @@ class Simulation:
         Definition with the calibrated values.
     displacements : (N, d) ndarray, [m]
         Of the recording's displacement channels, from where each has its first reading.
+    preload : mapping of bearing to (2 G,) ndarray, [N]
+        As :func:`preload_along` gives it; empty where it does not follow the temperatures.
     model : mapping
         Size and checked error of the reduced model; empty for a network.
     """
@@ -65,6 +67,7 @@ class Simulation:
     notes: tuple[str, ...]
     model: Mapping[str, Any]
     displacements: Array = field(default_factory=lambda: np.empty((0, 0)))
+    preload: Mapping[str, Array] = field(default_factory=dict)
 
 
 def simulate_recordings(
@@ -105,15 +108,21 @@ def _simulate_geometry(
     fast = fast_model_for(spec, recordings, as_given=not calibration, progress=progress)
     effects = effects_on(spec.effects, fast, recording)
     error = None
+    assembled, result = fast, None
     if followed.follows_preload:
         fast, error = with_followed_preload(followed, fast, recordings, effects, progress=progress)
-    result = None
     if calibration:
         told = [with_displacements(item) for item in calibration]
         earlier = Predictor(fast, told, effects=effects, at_stamps=True)
         result = fit_parameters(earlier, progress=progress)
     predictor = Predictor(fast, [recording], effects=effects, at_stamps=True)
     factors = {} if result is None else result.factors
+    if result is not None and followed.follows_preload:
+        # a calibrated machine goes elsewhere
+        fast, error = with_followed_preload(
+            followed, assembled, (recording,), effects, factors, progress=progress
+        )
+        predictor = Predictor(fast, [recording], effects=effects, at_stamps=True)
     outside = _outside_range(predictor, factors)
     if outside:
         progress("reduced model: outside its range, made anew")
@@ -158,6 +167,7 @@ def _simulate_geometry(
             "mesh_preset": spec.mesh.preset,
         },
         _displacements(predictor, factors),
+        preload_along(predictor, 0, factors),
     )
 
 

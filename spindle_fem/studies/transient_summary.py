@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from spindle_fem.errors import NoSteadyStateError
+from spindle_fem.model.elastic.machine_growth import NOSE
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.solvers.prepared_machine import PreparedMachine
+from spindle_fem.solvers.transient_records import MachineTransient
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.transient_study import StudyResult, time_to_stay_within
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -35,6 +37,7 @@ def summarise(machine: PreparedMachine, result: StudyResult) -> dict[str, Any]:
                     zip(run.probes, (run.readings[-1] - ZERO_CELSIUS_K).tolist(), strict=True)
                 ),
                 "hottest_degC": float(run.steps.hottest[-1]) - ZERO_CELSIUS_K,
+                **_growth(run),
                 "heat_W": float(run.steps.bearing_heat[-1].sum()),
                 "coolant_heat_W": float(run.steps.coolant_heat[-1]),
                 "energy": {
@@ -92,6 +95,24 @@ def equilibrium_of(machine: PreparedMachine, result: StudyResult) -> dict[str, A
             f"{band:g}": _finite(time_to_stay_within(run.times, run.readings, final, band)) for band in BANDS
         },
     }
+
+
+def _growth(run: MachineTransient) -> dict[str, Any]:
+    """Blocks ``growth`` and ``displacements`` at the end of a phase; none without elastic bodies."""
+    if not run.motions:
+        return {}
+    last = dict(zip(run.motions, (1.0e6 * run.motion[-1]).tolist(), strict=True))
+    nose = {motion_key(name): last.pop(name) for name in NOSE if name in last}
+    return {"growth": nose, "displacements": last}
+
+
+def motion_key(name: str) -> str:
+    """A motion with its unit, as keys of results have it: ``nose_axial_um``, ``nose_tilt_up_urad``.
+
+    >>> motion_key("nose_tilt_up")
+    'nose_tilt_up_urad'
+    """
+    return f"{name}_{'urad' if '_tilt_' in name else 'um'}"
 
 
 def _finite(value: float) -> float | None:

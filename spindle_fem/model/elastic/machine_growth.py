@@ -74,6 +74,39 @@ class Growth:
     nose_tilt: tuple[float, float] | None = None
 
 
+# Motions of the nose, m and rad.
+NOSE = ("nose_axial", "nose_radial_up", "nose_radial_across", "nose_tilt_up", "nose_tilt_across")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motions:
+    """Displacements of a machine since assembly as sums over its temperatures.
+
+    Attributes
+    ----------
+    nose : tuple of str
+        Those of :data:`NOSE` that are defined, m and rad.
+    sensors : tuple of str
+        Displacement sensors, m.
+    rows : (k, n_unknowns) ndarray
+        Of the nose's motions, then of the sensors, by each temperature [1/K].
+    assembled : (k,) ndarray
+        Their products with the temperature of assembly.
+    spins : (k,) ndarray
+        What 1 rad/s adds; it grows with the square of the speed.
+    """
+
+    nose: tuple[str, ...]
+    sensors: tuple[str, ...]
+    rows: Array
+    assembled: Array
+    spins: Array
+
+    def at(self, products: Array, speed: Array) -> Array:
+        """Motions (n, k) from the products of the rows with temperatures (n, k), at speeds (n,) [rad/s]."""
+        return products - self.assembled + np.square(speed)[:, None] * self.spins
+
+
 def _assembled_radial_force(spec: MachineSpec, group: BearingSet, bearing: SetBearing) -> float:
     """Radial force between the rings of a bearing from its assembled preload, N; rollers carry none."""
     if not group.preload > 0.0:
@@ -313,12 +346,34 @@ class GrowthModel:
         )
 
     def _nose(self, temperature: Array) -> float | None:
+        row = self._forward_row
+        return None if row is None else float(row @ (temperature - self.assembly_temperature))
+
+    @cached_property
+    def _forward_row(self) -> Array | None:
+        """Forward shift of the nose by each temperature, (n_unknowns,) m/K; None where it is not defined."""
         forward = [
             rows[outputs.names.index("forward")]
             for outputs, rows in self.carriers.values()
             if "forward" in outputs.names
         ]
-        if not forward or len(forward) < len(self.seating.carriers):
-            return None
-        rise = temperature - self.assembly_temperature
-        return float(sum(row @ rise for row in forward))
+        return sum(forward) if forward and len(forward) == len(self.seating.carriers) else None
+
+    @cached_property
+    def motions(self) -> Motions:
+        """Everything that a machine shows of its growth from outside: the nose, then every sensor."""
+        names, blocks = [], []
+        if self._forward_row is not None:
+            names, blocks = [NOSE[0]], [self._forward_row[None]]
+        if len(self.bending):
+            names, blocks = [*names, *NOSE[1:]], [*blocks, self.bending]
+        seen, spins = self.sensor_rows if self.sights else (np.zeros((0, self._size)), np.zeros(0))
+        rows = np.concatenate([*blocks, seen])
+        still = np.zeros(len(names))
+        return Motions(
+            tuple(names),
+            tuple(sight.name for sight in self.sights),
+            rows,
+            rows.sum(axis=1) * self.assembly_temperature,
+            np.concatenate((still, spins)),
+        )

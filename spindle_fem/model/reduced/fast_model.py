@@ -130,7 +130,7 @@ class FastModel:
         self.heat_places, self.load_names = inputs.heat_places, inputs.load_names
         self.directions = ConductingDirections(model, spread)
         self.channel = inputs.channel_operators(model)
-        self._point_rows = [self.channels.index(name) for name in model.probe_names]
+        self.point_rows = [self.channels.index(name) for name in model.probe_names]
         self._base: dict[tuple[float, ...], Array] = {}
         # Positions of coefficients that are the same at all operating points so far, and of the others.
         self._alike: tuple[int, ...] = tuple(range(len(model.coefficient_names)))
@@ -267,7 +267,7 @@ class FastModel:
         loads[:, : len(self.heat_places)] = self._heat_loads
         self._add_fluids(loads, model.fluid_names, values)
         outputs = np.zeros((len(self.channels), model.size))
-        outputs[self._point_rows] = model.probes
+        outputs[self.point_rows] = model.probes
         output_inputs = np.zeros((len(self.channels), len(self.load_names)))
         found = ClassOperators(conduction, loads, outputs, output_inputs)
         self._add_conductances(found, conductances)

@@ -1,7 +1,7 @@
-"""Preload that follows the temperatures in the fast model: bearing mechanics at sampled states of its own runs.
+"""Preload that follows temperatures in the fast model: bearing mechanics at sampled states of its own runs.
 
-The sets are solved where runs of the machine go, the farthest from what is known first, until what lies between
-the samples is right too. Samples stay in the cache for later runs.
+The sets are solved where runs of the machine go, the farthest from what is known first, until what lies
+between the samples is right too. Samples stay in the cache for later runs.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from spindle_fem.cache import cache_directory, load_record, save_record, source_digest
 from spindle_fem.definition.machine_spec import MachineSpec
@@ -28,7 +29,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 FORMAT = "spindle-fem/mounted-samples/1"
-# Scaled units: a micrometre of a ring, four kelvins, a third of the speed, 200 N of thrust change friction alike.
+# Scaled units: a micrometre of a ring, four kelvins, a third of the speed and 200 N of thrust change friction
+# about alike.
 PER_KELVIN, PER_LOG_SPEED, PER_NEWTON = 0.25, 3.0, 0.005
 # Samples solved in one round, and of all; rounds.
 FRESH, MOST_SAMPLES, MOST_ROUNDS = 16, 320, 20
@@ -82,7 +84,7 @@ class _Samples:
 
 
 class FollowedPreload:
-    """Friction, ball conductances, joints and preload of the bearings as mounted, over the unknowns of a model.
+    """Friction, ball conductances, joints and preload of the bearings as mounted, over unknowns of a model.
 
     Parameters
     ----------
@@ -250,23 +252,21 @@ def sample_preload(
         seen = _instants(mounted, model, march(known), float(friction.speed[0]))
         chosen = _farthest(mounted, seen, samples)
         if not len(chosen):
+            error = min(error, FRICTION_ERROR)
             break
         fresh = _solve(mounted, seen.at(chosen))
-        solved = _solved(fresh)
-        if known is not None and solved.any():
-            error, enough = _mismatch(mounted, known, fresh.at(solved))
         samples = fresh if samples is None else samples.joined(fresh)
         if not _solved(samples).any():
             break
-        if known is not None and solved.all() and enough:
-            break
+        if known is not None:
+            error, enough = _mismatch(mounted, known, fresh.at(_solved(fresh)))
+            if enough and _solved(fresh).all():
+                break
         known = FollowedPreload(mounted, samples.at(_solved(samples)), offsets)
         if len(samples.speed) >= MOST_SAMPLES:
             break
-    else:
-        solved = np.ones(1, dtype=bool)
     save_record(samples, path, FORMAT)
-    if known is None or not solved.all():
+    if known is None or not _solved(samples)[_apart(mounted, seen, samples).argmin(axis=1)].all():
         raise ConvergenceError(
             f"{spec.name}: preload",
             "the bearings have no equilibrium at temperatures that this run would reach.",
@@ -300,13 +300,17 @@ def _positions(mounted: MountedStates, samples: _Samples) -> Array:
     )
 
 
+def _apart(mounted: MountedStates, seen: _Samples, samples: _Samples) -> Array:
+    """Distances of instants from samples, (n, m)."""
+    return cdist(_positions(mounted, seen), _positions(mounted, samples))
+
+
 def _farthest(mounted: MountedStates, seen: _Samples, samples: _Samples | None) -> NDArray[np.int64]:
     """Instants to solve next: each the farthest from all samples and from those before it."""
     where = _positions(mounted, seen)
     nearest = np.full(len(where), np.inf)
     if samples is not None:
-        for known in _positions(mounted, samples):
-            nearest = np.minimum(nearest, np.linalg.norm(where - known, axis=1))
+        nearest = _apart(mounted, seen, samples).min(axis=1)
     chosen: list[int] = []
     for _ in range(FRESH if samples is not None else 2 * FRESH):
         best = int(np.argmax(nearest))
@@ -328,18 +332,11 @@ def _solve(mounted: MountedStates, asked: _Samples) -> _Samples:
 
 
 def _mismatch(mounted: MountedStates, known: FollowedPreload, fresh: _Samples) -> tuple[float, bool]:
-    """Largest error of friction at states that the response did not know, and whether all errors are small."""
+    """Largest error of friction at states that the response did not know; whether all errors are small."""
     apart = np.abs(known.at_states(fresh.speed, fresh.thrust, fresh.states) - fresh.values)
+    bearing = [FRICTION_ERROR, CONDUCTANCE_ERROR, CONDUCTANCE_ERROR, PRELOAD_ERROR]
     limits = np.concatenate(
-        [
-            np.append(
-                np.tile(
-                    (FRICTION_ERROR, CONDUCTANCE_ERROR, CONDUCTANCE_ERROR, PRELOAD_ERROR), len(group.bearings)
-                ),
-                np.full(len(group.joints), CONDUCTANCE_ERROR),
-            )
-            for group in mounted.sets
-        ]
+        [len(group.bearings) * bearing + len(group.joints) * [CONDUCTANCE_ERROR] for group in mounted.sets]
     )
     heat = apart[:, limits == FRICTION_ERROR]
     return float(heat.max(initial=0.0)), bool(np.all(apart <= limits))

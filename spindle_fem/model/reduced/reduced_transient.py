@@ -346,6 +346,8 @@ class TransientRun:
         at_grid = np.empty((len(states), n_out))
         by_grid = np.zeros((len(states), n_out, n_par))
         last = len(drive.steps) - 1
+        spins = fast.model.probe_spins
+        speed = drive.names.index("speed") if spins.any() else None
         owner = np.append(self.step_class, self.step_class[last])
         inputs = np.vstack((self.start, self.end[last:]))
         added = np.zeros((len(states), 0)) if tracks is None else tracks.added()
@@ -368,6 +370,9 @@ class TransientRun:
                 if parameter in operators.outputs_by:
                     by_grid[rows, :, column] += states[rows] @ operators.outputs_by[parameter].T
                     by_grid[rows, :, column] += inputs[rows] @ operators.output_inputs_by[parameter].T
+        if speed is not None:
+            turning = np.append(drive.start[:, speed], drive.end[-1:, speed])
+            at_grid[:, fast.point_rows] += np.square(turning)[:, None] * spins
         return FastTransient(
             drive.times,
             fast.channels,

@@ -88,7 +88,9 @@ class SampledResponse:
         apart = where[:, None, :] - self.samples
         scaled = np.sqrt(5.0) / self.length * np.sqrt(np.einsum("gnc,gnc->gn", apart, apart))
         fading = np.exp(-scaled)
-        value = (1.0 + scaled + scaled**2 / 3.0) * fading @ self.weights + self.line[0] + where @ self.line[1:]
+        value = (
+            (1.0 + scaled + scaled**2 / 3.0) * fading @ self.weights + self.line[0] + where @ self.line[1:]
+        )
         falling = (-5.0 / (3.0 * self.length**2)) * (1.0 + scaled) * fading
         slope = np.einsum("gn,gnc,nm->gmc", falling, apart[:, :, :count], self.weights, optimize=True)
         return value, slope + self.line[1 : 1 + count].T
