@@ -106,14 +106,14 @@ def test_simulate_takes_it_and_a_calibrated_machine_keeps_its_heat_model(spec, f
     noise = np.random.default_rng(5).normal(0.0, 0.1, TIMES.size)
     frame["rear seat"] = made[:, fast.channels.index("SP05")] - 273.15 + noise
     recorded_in(tmp_path, frame, {"rear seat": "SP05"}, {"n": "speed"})
+    assembled = (*OVERRIDES, "heat.thermal_preload=false")
     found = simulate_machine(
-        "wu_tan_2016", tmp_path, tmp_path / "out", calibrate=[tmp_path], overrides=OVERRIDES
+        "wu_tan_2016", tmp_path, tmp_path / "out", calibrate=[tmp_path], overrides=assembled
     )
     assert found["channels"][0]["rmse_K"] < 0.12
     assert any('"full" friction and ball contacts from a map' in note for note in found["notes"])
-    assert any("thermal preload is left out" in note for note in found["notes"])
+    assert "preload_N" not in found
     written = load_machine(tmp_path / "out" / "calibrated_machine.toml")
     assert written.heat.model == "full"
-    assert written.follows_preload
     assert {group.ball_row.kind for group in written.bearing_set} == {"contact"}
     assert isinstance(fast.inputs.extra_terms[0], FilmHeat)

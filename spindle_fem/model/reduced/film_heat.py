@@ -83,9 +83,16 @@ class FilmHeat(Term):
         if np.ndim(speed) == 0:
             yield slice(None), float(speed), float(thrust)
             return
-        distinct, number = np.unique(np.column_stack((speed, thrust)), axis=0, return_inverse=True)
-        order = np.argsort(number.ravel(), kind="stable")
-        ends = np.cumsum(np.bincount(number.ravel()))[:-1]
+        pairs = np.column_stack((speed, thrust))
+        # Columns of one instant, and mostly of many, lie side by side with the same of both.
+        fresh = np.append(True, np.any(pairs[1:] != pairs[:-1], axis=1))
+        distinct, number = np.unique(pairs[fresh], axis=0, return_inverse=True)
+        if len(distinct) == 1:
+            yield slice(None), *distinct[0].tolist()
+            return
+        number = number.ravel()[np.cumsum(fresh) - 1]
+        order = np.argsort(number, kind="stable")
+        ends = np.cumsum(np.bincount(number))[:-1]
         for columns, point in zip(np.split(order, ends), distinct.tolist(), strict=True):
             yield columns, *point
 

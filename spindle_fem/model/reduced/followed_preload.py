@@ -36,8 +36,14 @@ PER_KELVIN, PER_LOG_SPEED, PER_NEWTON = 0.25, 3.0, 0.005
 FRESH, MOST_SAMPLES, MOST_ROUNDS = 16, 320, 20
 # Samples to begin with are this far apart at least; nearer ones than the second say nothing more.
 FIRST_APART, NEAREST = 0.5, 0.05
-# Errors between samples that are left: of the logarithms of friction, conductances and joints, and N.
-FRICTION_ERROR, CONDUCTANCE_ERROR, PRELOAD_ERROR = 2.0e-3, 1.0e-2, 10.0
+# Share of a response's own span that it may go beyond what is sampled: a run that would leave the samples
+# by more is stopped there, and sampled there next.
+BEYOND = 0.25
+# Errors between samples that are left: of the logarithms of friction, conductances and joints, N and share of
+# the preload.
+FRICTION_ERROR, CONDUCTANCE_ERROR, PRELOAD_ERROR, PRELOAD_SHARE = 2.0e-3, 1.0e-2, 10.0, 5.0e-3
+# The largest error of friction with which a run is given.
+LARGEST_ERROR = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,7 +153,8 @@ class FollowedPreload:
         found = []
         for group, response in self._responses:
             flat = _scaled(states[:, list(group.rows)]).reshape(len(states), -1)
-            found.append(response.at((flat - response.middle) @ response.directions, inputs)[0])
+            at = (flat - response.middle) @ response.directions
+            found.append(response.within(at, inputs, BEYOND)[0])
         return np.hstack(found)
 
     def quantities(self, coordinates: NDArray, context: TermContext) -> NDArray:
@@ -170,7 +177,7 @@ class FollowedPreload:
         found, first = [], 0
         for (_, response), zero in zip(self._responses, self._zeros, strict=True):
             rows = slice(first, first + response.directions.shape[1])
-            value, slope = response.at(coordinates[rows][:, fresh].real.T - zero, inputs[fresh])
+            value, slope = response.within(coordinates[rows][:, fresh].real.T - zero, inputs[fresh], BEYOND)
             moved = coordinates[rows].imag.T
             found.append(value[own].T + 1j * np.einsum("kmq,kq->mk", slope[own], moved))
             first = rows.stop
@@ -266,7 +273,8 @@ def sample_preload(
         if len(samples.speed) >= MOST_SAMPLES:
             break
     save_record(samples, path, FORMAT)
-    if known is None or not _solved(samples)[_apart(mounted, seen, samples).argmin(axis=1)].all():
+    settled = error <= LARGEST_ERROR and known is not None
+    if not settled or not _solved(samples)[_apart(mounted, seen, samples).argmin(axis=1)].all():
         raise ConvergenceError(
             f"{spec.name}: preload",
             "the bearings have no equilibrium at temperatures that this run would reach.",
@@ -339,7 +347,8 @@ def _mismatch(mounted: MountedStates, known: FollowedPreload, fresh: _Samples) -
         [len(group.bearings) * bearing + len(group.joints) * [CONDUCTANCE_ERROR] for group in mounted.sets]
     )
     heat = apart[:, limits == FRICTION_ERROR]
-    return float(heat.max(initial=0.0)), bool(np.all(apart <= limits))
+    allowed = limits + np.where(limits == PRELOAD_ERROR, PRELOAD_SHARE * np.abs(fresh.values), 0.0)
+    return float(heat.max(initial=0.0)), bool(np.all(apart <= allowed))
 
 
 def _kept(path: Path) -> _Samples | None:

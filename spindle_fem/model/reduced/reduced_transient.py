@@ -101,14 +101,14 @@ def simulate_fast(
         The terms run away.
     """
     everything = (*fast.own_terms(drive), *terms)
-    given = parameters or {}
+    given, near = parameters or {}, None
     if fast.channel is not None and fast.channel.film_follows_wall:
         own = drive
         for _ in range(WALL_ROUNDS):
-            states, _ = TransientRun(fast, own, given, (), everything).march(initial)
-            own = with_walls(drive, fast.channel.walls(states))
+            near, _ = TransientRun(fast, own, given, (), everything).march(initial, near)
+            own = with_walls(drive, fast.channel.walls(near))
         drive = own
-    return TransientRun(fast, drive, given, tuple(derivatives), everything).solve(initial)
+    return TransientRun(fast, drive, given, tuple(derivatives), everything).solve(initial, near)
 
 
 class TransientRun:

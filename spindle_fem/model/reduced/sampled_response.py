@@ -40,6 +40,8 @@ class SampledResponse:
         Of the correlation.
     weights : (n, m) ndarray
     line : (1 + q + k, m) ndarray
+    ends : (2, m) ndarray
+        Smallest and largest sampled value.
     """
 
     middle: Array
@@ -49,6 +51,7 @@ class SampledResponse:
     length: float
     weights: Array
     line: Array
+    ends: Array
 
     @classmethod
     def through(cls, states: Array, inputs: Array, values: Array) -> SampledResponse:
@@ -72,8 +75,9 @@ class SampledResponse:
         if len(samples) <= straight.shape[1]:
             straight[:, 1:] = 0.0
         fits = [_fitted(samples, straight, values, length) for length in LENGTHS]
+        ends = np.array([values.min(axis=0), values.max(axis=0)])
         best = min(range(len(fits)), key=lambda number: fits[number][0])
-        return cls(middle, directions, fixed, samples, LENGTHS[best], *fits[best][1:])
+        return cls(middle, directions, fixed, samples, LENGTHS[best], *fits[best][1:], ends)
 
     def at(self, coordinates: Array, inputs: Array) -> tuple[Array, Array]:
         """Quantities (g, m), and their derivatives by the coordinates (g, m, q).
@@ -94,6 +98,16 @@ class SampledResponse:
         falling = (-5.0 / (3.0 * self.length**2)) * (1.0 + scaled) * fading
         slope = np.einsum("gn,gnc,nm->gmc", falling, apart[:, :, :count], self.weights, optimize=True)
         return value, slope + self.line[1 : 1 + count].T
+
+    def within(self, coordinates: Array, inputs: Array, beyond: float) -> tuple[Array, Array]:
+        """As :meth:`at`, but held at ``beyond`` times 1 and the span of the samples away from these.
+
+        Held values do not change with the coordinates.
+        """
+        value, slope = self.at(coordinates, inputs)
+        reach = beyond * (1.0 + np.ptp(self.ends, axis=0))
+        held = np.clip(value, self.ends[0] - reach, self.ends[1] + reach)
+        return held, np.where((held == value)[:, :, None], slope, 0.0)
 
 
 def _fitted(samples: Array, straight: Array, values: Array, length: float) -> tuple[float, Array, Array]:
