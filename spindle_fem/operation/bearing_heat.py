@@ -130,8 +130,8 @@ def without_unasked_preload(spec: MachineSpec) -> tuple[MachineSpec, tuple[str, 
     if not spec.follows_preload or spec.heat.thermal_preload is not None:
         return spec, ()
     note = (
-        "thermal preload is left out: in the fast model bearings keep the size of assembly "
-        "(spindle-fem run and transient follow it)"
+        "thermal preload is left out: in this fast model bearings keep the size of assembly "
+        "(spindle-fem run, transient and simulate follow it)"
     )
     return at_assembly_size(spec), (note,)
 

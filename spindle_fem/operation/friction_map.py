@@ -232,8 +232,8 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
         raise SpecError(
             "heat.thermal_preload",
             "with it heat follows every ring, and no table over one film temperature holds.",
-            "Switch it off for the fast model (--set heat.thermal_preload=false), give the heat by table "
-            "(--set heat.model=table, with a [heat.table]), or run the full model (spindle-fem transient).",
+            "Switch it off here (--set heat.thermal_preload=false), give the heat by table "
+            "(--set heat.model=table, with a [heat.table]), or use spindle-fem simulate or transient.",
         )
     mechanics = BearingMechanics(spec)
     names = tuple(bearing.name for _, bearing in spec.bearings)

@@ -51,7 +51,7 @@ def driven(spec):
 
 def test_expansion_is_refused_with_a_way_out(spec):
     follows = spec.model_copy(update={"heat": spec.heat.model_copy(update={"thermal_preload": True})})
-    with pytest.raises(SpecError, match=r"every ring.*heat.thermal_preload=false.*spindle-fem transient"):
+    with pytest.raises(SpecError, match=r"every ring.*heat.thermal_preload=false.*spindle-fem simulate"):
         fast_model_for(follows, [])
 
 
