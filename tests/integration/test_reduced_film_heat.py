@@ -13,6 +13,7 @@ from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.film_heat import FilmHeat
 from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.bearing_heat import at_assembly_size
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.recordings.input_samples import InputHistory
@@ -70,7 +71,7 @@ def test_it_follows_the_full_model_whose_friction_follows_its_films(spec, fast):
         reduced = run.temperature[::3, fast.channels.index(probe)]
         assert np.abs(reduced - full.reading(probe)).max() < 0.05, probe
     # Without the term the same heat table errs visibly.
-    plain = type(fast)(fast.model, fast.spec)
+    plain = fast_spindle(fast.model, fast.spec)
     cold = simulate_fast(plain, drive, point.ambient_temperature)
     row = fast.channels.index("SP01")
     assert np.abs(cold.temperature[::3, row] - full.reading("SP01")).max() > 0.05
