@@ -80,4 +80,4 @@ def _run(predictor: Predictor, number: int, factors: Mapping[str, float]) -> Mou
         np.concatenate((drive.start[:, column], drive.end[:, column]))
         for column in (drive.names.index("speed"), drive.names.index("thrust"))
     )
-    return MountedRun(unknowns, speed, thrust)
+    return MountedRun(np.concatenate((drive.grid[:-1], drive.grid[1:])), unknowns, speed, thrust)

@@ -32,8 +32,8 @@ FORMAT = "spindle-fem/mounted-samples/1"
 # Scaled units: a micrometre of a ring, four kelvins, a third of the speed and 200 N of thrust change friction
 # about alike.
 PER_KELVIN, PER_LOG_SPEED, PER_NEWTON = 0.25, 3.0, 0.005
-# Samples solved in one round, and of all; rounds.
-FRESH, MOST_SAMPLES, MOST_ROUNDS = 16, 320, 20
+# Samples solved in one round, those that a response takes, those in the cache; rounds.
+FRESH, MOST_SAMPLES, MOST_KEPT, MOST_ROUNDS = 16, 320, 1000, 20
 # Samples to begin with are this far apart at least; nearer ones than the second say nothing more.
 FIRST_APART, NEAREST = 0.5, 0.05
 # Share of a response's own span that it may go beyond what is sampled: a run that would leave the samples
@@ -52,11 +52,13 @@ class MountedRun:
 
     Attributes
     ----------
+    times : (g,) ndarray, [s]
     unknowns : (g, r) ndarray
         Of the fast model.
     speed, thrust : (g,) ndarray, [rad/s], [N]
     """
 
+    times: Array
     unknowns: Array
     speed: Array
     thrust: Array
@@ -250,38 +252,65 @@ def sample_preload(
     progress("preload: bearings along the run")
     mounted = MountedStates(spec, model.contacts, friction)
     path = cache_directory() / f"mounted-{_digest(spec, mounted)}.npz"
-    samples, known = _kept(path), None
+    samples, known, error = _kept(path), None, np.inf
     _, offsets = mounted.rows(model)
     if samples is not None:
-        known = FollowedPreload(mounted, samples.at(_solved(samples)), offsets)
-    error = np.inf
-    for _ in range(MOST_ROUNDS):
-        seen = _instants(mounted, model, march(known), float(friction.speed[0]))
-        chosen = _farthest(mounted, seen, samples)
-        if not len(chosen):
-            error = min(error, FRICTION_ERROR)
-            break
-        fresh = _solve(mounted, seen.at(chosen))
-        samples = fresh if samples is None else samples.joined(fresh)
-        if not _solved(samples).any():
-            break
-        if known is not None:
-            error, enough = _mismatch(mounted, known, fresh.at(_solved(fresh)))
-            if enough and _solved(fresh).all():
-                break
-        known = FollowedPreload(mounted, samples.at(_solved(samples)), offsets)
-        if len(samples.speed) >= MOST_SAMPLES:
-            break
-    save_record(samples, path, FORMAT)
-    settled = error <= LARGEST_ERROR and known is not None
-    if not settled or not _solved(samples)[_apart(mounted, seen, samples).argmin(axis=1)].all():
-        raise ConvergenceError(
-            f"{spec.name}: preload",
-            "the bearings have no equilibrium at temperatures that this run would reach.",
-            "Preload runs away: lower the speed, loosen the fits, or run at the size of assembly "
-            "(--set heat.thermal_preload=false).",
-        )
+        known = FollowedPreload(mounted, _latest(samples), offsets)
+    try:
+        for _ in range(MOST_ROUNDS):
+            runs = march(known)
+            seen = _instants(mounted, model, runs, float(friction.speed[0]))
+            chosen = _farthest(mounted, seen, samples)
+            settled = known is not None
+            if len(chosen):
+                fresh = _solve(mounted, seen.at(chosen))
+                samples = fresh if samples is None else samples.joined(fresh)
+                if known is not None:
+                    error, enough = _mismatch(mounted, known, fresh.at(_solved(fresh)))
+                    settled = enough and bool(_solved(fresh).all())
+            if settled:
+                error = min(error, FRICTION_ERROR) if not len(chosen) else error
+                doubtful = _doubtful(mounted, seen, samples)
+                if not len(doubtful):
+                    return known, error
+                fresh = _solve(mounted, seen.at(doubtful))
+                samples = samples.joined(fresh)
+                if not _solved(fresh).all():
+                    raise _runaway(spec, runs, int(doubtful[np.flatnonzero(~_solved(fresh))[0]]))
+            if not _solved(samples).any():
+                raise _runaway(spec, runs, int(chosen[0]))
+            known = FollowedPreload(mounted, _latest(samples), offsets)
+    finally:
+        if samples is not None:
+            save_record(samples.at(np.arange(len(samples.speed))[-MOST_KEPT:]), path, FORMAT)
+    if error > LARGEST_ERROR:
+        lost = np.flatnonzero(~_solved(fresh))
+        raise _runaway(spec, runs, int(chosen[lost[0] if len(lost) else 0]))
     return known, error
+
+
+def _latest(samples: _Samples) -> _Samples:
+    """The last solved ones, as many as a response takes."""
+    return samples.at(np.flatnonzero(_solved(samples))[-MOST_SAMPLES:])
+
+
+def _doubtful(mounted: MountedStates, seen: _Samples, samples: _Samples) -> NDArray[np.int64]:
+    """Some instants nearest to states without equilibrium, which may have none either: the nearest first."""
+    apart = _apart(mounted, seen, samples)
+    near = np.flatnonzero(~_solved(samples)[apart.argmin(axis=1)])
+    return near[np.argsort(apart[near].min(axis=1, initial=np.inf), kind="stable")][:FRESH]
+
+
+def _runaway(spec: MachineSpec, runs: Sequence[MountedRun], instant: int) -> ConvergenceError:
+    """Refusal of a run at one of its instants."""
+    times, speed = (np.concatenate([getattr(run, name) for run in runs]) for name in ("times", "speed"))
+    return ConvergenceError(
+        f"{spec.name}: preload",
+        f"after {times[instant] / 3600.0:.2f} h at {speed[instant] * 30.0 / np.pi:.0f} rpm the bearings have "
+        "no equilibrium.",
+        "Preload runs away: lower the speed, loosen the fits, or run at the size of assembly "
+        "(--set heat.thermal_preload=false).",
+    )
 
 
 def _solved(samples: _Samples) -> NDArray[np.bool_]:
@@ -341,6 +370,8 @@ def _solve(mounted: MountedStates, asked: _Samples) -> _Samples:
 
 def _mismatch(mounted: MountedStates, known: FollowedPreload, fresh: _Samples) -> tuple[float, bool]:
     """Largest error of friction at states that the response did not know; whether all errors are small."""
+    if not len(fresh.speed):
+        return np.inf, False
     apart = np.abs(known.at_states(fresh.speed, fresh.thrust, fresh.states) - fresh.values)
     bearing = [FRICTION_ERROR, CONDUCTANCE_ERROR, CONDUCTANCE_ERROR, PRELOAD_ERROR]
     limits = np.concatenate(
