@@ -22,7 +22,7 @@ from spindle_fem.recordings.compare import (
     simulation_summary,
     write_simulated,
 )
-from spindle_fem.report.read_against_predicted import draw_channels
+from spindle_fem.report.read_against_predicted import draw_channels, draw_displacements
 from spindle_fem.report.simulation_data import simulation_dataset
 from spindle_fem.report.simulation_report import write_simulation_report
 from spindle_fem.results.dataset import write_dataset
@@ -100,6 +100,8 @@ def write_simulation(simulation: Simulation, folder: Path, *, started: float) ->
     write_simulated(folder / "simulated.csv", recording, simulation.predicted, simulation.displacements)
     write_dataset(simulation_dataset(simulation), folder / "simulation.nc")
     figures = draw_channels(folder / "figures", recording, simulation.predicted, simulation.half_width)
+    if simulation.displacements.size:
+        figures += draw_displacements(folder / "figures", recording, simulation.displacements)
     _write_error_table(folder / "error_table.csv", comparison)
     summary = simulation_summary(comparison)
     inside = np.abs(comparison.residual) <= simulation.half_width

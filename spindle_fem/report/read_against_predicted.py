@@ -1,4 +1,4 @@
-"""Temperature channels over time: readings, predictions, and the residuals."""
+"""Channels over time: readings, predictions, and the residuals."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
+from spindle_fem.recordings.displaced_readings import MICROMETRES
 from spindle_fem.report.clock_axis import label_times, time_scale
 from spindle_fem.report.figure_style import (
     CYCLE,
@@ -44,6 +45,8 @@ LINES = {
 MOST_CHANNELS = 12
 MOST_POINTS = 1500
 BINS = 240
+# Standard deviations of an interval that should hold nine readings in ten.
+NINE_IN_TEN = 1.645
 # A pause longer than this many usual steps divides a recording.
 LONG_GAP_STEPS = 60.0
 
@@ -63,6 +66,8 @@ class Course:
         Half width of the shaded band about no residual.
     held_out : (N,) ndarray of bool
         Stamps that no fit saw; shaded.
+    units : (str, str)
+        Of the readings, and of a residual.
     """
 
     name: str
@@ -71,6 +76,7 @@ class Course:
     predictions: Mapping[str, Array]
     band: float | Array
     held_out: NDArray[np.bool_]
+    units: tuple[str, str] = ("°C", "K")
 
 
 def draw_course(upper: Axes, lower: Axes, course: Course, scale: float) -> None:
@@ -98,8 +104,8 @@ def draw_course(upper: Axes, lower: Axes, course: Course, scale: float) -> None:
         lower.plot(at, mean, color=colour, linewidth=1.3, linestyle=style, zorder=3)
     upper.tick_params(labelbottom=False)
     upper.margins(x=0.01)
-    upper.set_ylabel("°C")
-    lower.set_ylabel("residual / K")
+    upper.set_ylabel(course.units[0])
+    lower.set_ylabel(f"residual / {course.units[1]}")
 
 
 def draw_legend(figure: Figure, predictions: Mapping[str, Array], band: str, *, held_out: bool) -> None:
@@ -178,6 +184,35 @@ def draw_channels(folder: Path, recording: Recording, predicted: Array, half_wid
     for course in simulated_courses(recording, predicted, half_width):
         figure = simulated_figure([course], f"{recording.name}: {course.name}", recording.start)
         written.append(save_png(figure, folder / f"residual_{_safe(course.name)}.png", colours=128))
+    return written
+
+
+def draw_displacements(folder: Path, recording: Recording, predicted: Array) -> list[Path]:
+    """``displacement_<channel>.png`` of each displacement channel of a simulated recording.
+
+    Parameters
+    ----------
+    folder : Path
+        That exists.
+    predicted : (N, d) ndarray, [m]
+        From the first reading of each.
+    """
+    nothing = np.zeros(recording.times.size, dtype=bool)
+    notes = "Displacement since its first reading above, residual (read − predicted) beneath."
+    written = []
+    for column, name in enumerate(recording.displacement_names):
+        course = Course(
+            name,
+            recording.times,
+            MICROMETRES * recording.displacements[:, column],
+            {"predicted": MICROMETRES * predicted[:, column]},
+            NINE_IN_TEN * MICROMETRES * recording.displacement_sigma[column],
+            nothing,
+            ("µm", "µm"),
+        )
+        title, band = f"{recording.name}: {name}", "noise, 90 % of readings"
+        figure = courses_figure([course], title, notes, band, recording.start)
+        written.append(save_png(figure, folder / f"displacement_{_safe(name)}.png", colours=128))
     return written
 
 

@@ -15,12 +15,23 @@ if TYPE_CHECKING:
 SIMULATION_SCHEMA = "spindle-fem/simulation-data/1"
 
 
+def _displaced(simulation: Simulation) -> dict[str, tuple]:
+    """Displacement channels, from the first reading of each."""
+    if not simulation.displacements.size:
+        return {}
+    along, metres = ("stamp", "displacement_name"), {"units": "m"}
+    return {
+        "displacement": (along, simulation.recording.displacements, metres),
+        "displacement_predicted": (along, simulation.displacements, metres),
+    }
+
+
 def simulation_dataset(simulation: Simulation) -> xr.Dataset:
     """Inputs and results of a simulation; temperatures in °C, inputs in SI, named as in ``diagnosis.nc``."""
     import xarray as xr
 
     recording = simulation.recording
-    along = ("stamp", "channel")
+    along, displaced = ("stamp", "channel"), _displaced(simulation)
     return xr.Dataset(
         {
             "time": ("stamp", recording.times, {"units": "s", "long_name": "time from the first stamp"}),
@@ -31,7 +42,12 @@ def simulation_dataset(simulation: Simulation) -> xr.Dataset:
             "input_unit": ("input_name", list(recording.input_units)),
             "input_held": ("input_name", recording.held.astype(np.int8)),
             "channel_probe": ("channel", list(recording.probes)),
+            **displaced,
         },
-        {"channel": list(recording.temperature_names), "input_name": list(recording.input_names)},
+        {
+            "channel": list(recording.temperature_names),
+            "input_name": list(recording.input_names),
+            **({"displacement_name": list(recording.displacement_names)} if displaced else {}),
+        },
         {"schema": SIMULATION_SCHEMA, "machine": simulation.machine, "recording": recording.name},
     )

@@ -36,7 +36,7 @@ def write_simulation_report(folder: Path) -> Path:
     content = json.loads((folder / "simulation.json").read_text(encoding="utf-8"))
     calibration = content["calibration"]
     sections = [
-        Section("summary", "Summary", [Cards(_cards(content)), _channel_table(content)]),
+        Section("summary", "Summary", [Cards(_cards(content)), *_tables(content)]),
         Section("course", "Course", [_picture(folder, name) for name in content["figures"]]),
         Section("conditions", "Errors by operating condition", [_condition_table(content)]),
     ]
@@ -87,6 +87,30 @@ def _channel_table(content: Mapping[str, Any]) -> Table:
     )
 
 
+def _tables(content: Mapping[str, Any]) -> list[Table]:
+    """Errors by channel; displacements and preload where there are any."""
+    found = [_channel_table(content)]
+    if grown := content.get("displacements"):
+        fields = (
+            words("displacement", "channel"),
+            fixed("error / µm", "rmse_um", 2),
+            fixed("largest / µm", "max_um", 2),
+        )
+        found.append(table_of(fields, grown, "Read minus predicted, both from the first reading."))
+    if preload := content.get("preload_N"):
+        fields = (
+            words("bearing", lambda item: item[0]),
+            *(
+                fixed(f"{words_} / N", lambda item, key=key: item[1][key], 0)
+                for key, words_ in (("least", "least"), ("most", "most"), ("last", "at the end"))
+            ),
+        )
+        found.append(
+            table_of(fields, preload.items(), "Preload along the recording: it follows the temperatures.")
+        )
+    return found
+
+
 def _inside_percent(item: Mapping[str, Any]) -> float | None:
     share = item["inside_90_percent_interval"]
     return None if share is None else 100.0 * share
@@ -108,6 +132,11 @@ def _condition_table(content: Mapping[str, Any]) -> Table:
 
 
 def _picture(folder: Path, name: str) -> Any:
+    stem = Path(name).stem
+    if stem.startswith("displacement_"):
+        shown = stem.removeprefix("displacement_").replace("_", " ")
+        caption = f"{shown}: read and predicted displacement; below, read minus predicted."
+        return illustration_of(folder / name, caption)
     title = Path(name).stem.removeprefix("residual_").replace("_", " ")
     return illustration_of(
         folder / name,
