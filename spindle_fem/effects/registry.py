@@ -281,8 +281,8 @@ def _matching(
     elif isinstance(effect, IntervalEffect):
         offered = [
             effect.over(view, place, intervals, kind)
-            for place in effect.places(view)
-            for kind in effect.interval_forms
+            for place in dict.fromkeys((*effect.places(view), *effect.level_places(view)))
+            for kind in effect.forms_at(view, place)
         ]
     else:
         if intervals:

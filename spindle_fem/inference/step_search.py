@@ -15,10 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, IntervalEffect
-from spindle_fem.effects.framework.unrecorded import PULSES, STEPS
+from spindle_fem.effects.framework.unrecorded import LESS, PULSES, STEPS
 from spindle_fem.effects.registry import fixed
 from spindle_fem.inference import tuned
-from spindle_fem.inference.change_points import NOTHING, SHORTEST, choice, find_changes, levels_over_lowest
+from spindle_fem.inference.change_points import (
+    NOTHING,
+    SHORTEST,
+    Changes,
+    choice,
+    find_changes,
+    levels_over_lowest,
+)
 from spindle_fem.inference.hypothesis import Hypothesis, identity
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem, amplitude_name
 from spindle_fem.inference.hypothesis_search import Search
@@ -39,12 +46,26 @@ CHANGES_TRIED = 3
 
 @dataclass(frozen=True, slots=True)
 class StepPlace:
-    """Place where levels may change, and the number of instants."""
+    """Place where levels may change, and the number of instants.
+
+    Levels count from the lowest up, or from the highest down if they are ``less`` than at other times.
+    """
 
     effect: IntervalEffect
     pattern: Pattern
     recording: int
     instants: int
+    less: bool = False
+
+    @property
+    def form(self) -> str | None:
+        """Form of the effect."""
+        return LESS if self.less else None
+
+    @property
+    def sign(self) -> float:
+        """Of a level in terms of what it adds."""
+        return -1.0 if self.less else 1.0
 
 
 def add_steps(search: Search, fit: Fit) -> None:
@@ -90,6 +111,9 @@ def _settle(search: Search, fit: Fit, effect: IntervalEffect, onsets: Onsets) ->
         changes = find_changes(onsets.gram, onsets.data, spread)
         if changes is None:
             break
+        if best is None:
+            place = replace(place, less=_below_known(search, place, changes))
+        changes = replace(changes, steps=place.sign * changes.steps)
         spans = levels_over_lowest(changes, onsets.times, stop)
         found = _fitted(search, problem, fit, place, *spans, values)
         if found is None:
@@ -103,7 +127,7 @@ def _settle(search: Search, fit: Fit, effect: IntervalEffect, onsets: Onsets) ->
                 best = known if known.score > found.score else found
                 break
         best, problem, values = found, again, found.fit.values
-        onsets = _again(search, problem, best.fit, effect, onsets)
+        onsets = _again(place, problem, best.fit, onsets)
     if best is None:
         return
     # Compared with all other sets under the noise that they were fitted with.
@@ -115,6 +139,15 @@ def _settle(search: Search, fit: Fit, effect: IntervalEffect, onsets: Onsets) ->
                 last.fit.candidates[-1], _paid(search.problem, place, _spans(effect, last.fit)[0])
             )
             search.keep(last)
+
+
+def _below_known(search: Search, place: StepPlace, changes: Changes) -> bool:
+    """Whether levels lie mostly below what earlier readings say of a link or a source."""
+    if search.problem.belief.earlier is None:
+        return False
+    levels = np.concatenate(([0.0], np.cumsum(changes.steps)))
+    lower = -levels.min() > levels.max()
+    return bool(lower) and LESS in place.effect.forms_at(search.view, place.pattern.spot)
 
 
 def _simplest(search: Search, problem: Problem, fit: Fit, place: StepPlace, found: Hypothesis) -> Hypothesis:
@@ -225,7 +258,7 @@ def _raised(place: StepPlace, search: Search, values: Mapping[str, float], lowes
     if not probe.sized_by:
         return dict(values)
     now = values.get(probe.sized_by, 1.0)
-    return dict(values) | {probe.sized_by: now + lowest / probe.constants["nominal"]}
+    return dict(values) | {probe.sized_by: now + place.sign * lowest / probe.constants["nominal"]}
 
 
 def _fitted(
@@ -270,7 +303,7 @@ def _spans(effect: IntervalEffect, fit: Fit) -> tuple[list[tuple[float, float]],
     return pairs, [float(factor * size) for size in effect.sizes(candidate, fit.values)]
 
 
-def _again(search: Search, problem: Problem, fit: Fit, effect: IntervalEffect, onsets: Onsets) -> Onsets:
+def _again(place: StepPlace, problem: Problem, fit: Fit, onsets: Onsets) -> Onsets:
     """Inner products about a fit, the course of levels that it holds given back."""
     candidate = fit.candidates[-1]
     term = candidate.terms[0]
@@ -285,8 +318,8 @@ def _again(search: Search, problem: Problem, fit: Fit, effect: IntervalEffect, o
     )
     (found,) = onset_answers(problem, frozen, [onsets.pattern], onsets.recording, number=len(onsets.times))
     steps = np.zeros(len(found.times))
-    for (start, end), size in zip(*_spans(effect, fit), strict=True):
-        steps += size * (_at(found.times, start) - _at(found.times, end))
+    for (start, end), size in zip(*_spans(place.effect, fit), strict=True):
+        steps += place.sign * size * (_at(found.times, start) - _at(found.times, end))
     return replace(found, data=found.data + found.gram @ steps)
 
 
@@ -313,6 +346,7 @@ def _candidate(
         search.view,
         place.pattern.spot,
         intervals,
+        place.form,
         course=PULSES if alike else STEPS,
         sizes=() if alike else [level / mean for level in levels],
     )

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Reported, capital, place_words, quantity
-from spindle_fem.effects.framework.laws import Complex, amplitude, fluid_temperature, rows
+from spindle_fem.effects.framework.laws import Complex, amplitude, fluid_temperature
 from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
 from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.term import TermContext, TermParameter
 from spindle_fem.effects.framework.unrecorded import (
+    LESS,
+    ScaledTerm,
     Share,
     UnrecordedEffect,
     UnrecordedHeatTerm,
@@ -43,24 +46,16 @@ class CoolingTerm(UnrecordedTerm):
         return -size * self.spread.shares(context) * (context.temperatures - fluid)
 
 
-class LinkTerm(UnrecordedTerm):
-    """A link that conducts better: ``1 + G / G_0`` times as well.
+class LinkTerm(ScaledTerm):
+    """A link that conducts better or worse: ``1 ± G / G_0`` times as well."""
 
-    Parameters
-    ----------
-    coefficient : str
-    nominal : float, [W/K]
-        What the definition gives the link; the size counts in units of what a fit makes of that.
-    """
-
-    def __init__(self, name: str, size: TermParameter, on: Share, coefficient: str, nominal: float) -> None:
-        super().__init__(name, size, Spread(()), on)
-        self.coefficients, self._nominal = (coefficient,), nominal
+    def __init__(self, coefficient: str, *more: Any) -> None:
+        super().__init__(*more)
+        self.coefficients = (coefficient,)
 
     def factor(self, context: TermContext) -> Complex:
         """Factor on the link, (1, k)."""
-        more = context.parameters["conductance"] * self.on.share(context) / self._nominal
-        return rows(context, 1.0 + more)
+        return self.factor_of(context)
 
 
 class UnrecordedCooling(UnrecordedEffect):
@@ -130,16 +125,18 @@ class UnrecordedCooling(UnrecordedEffect):
         if scaled:
             nominal = machine.conductance[scaled]
             size = amplitude("conductance", max(usual, nominal), "W/K")
-            return LinkTerm(name, size, on, scaled, nominal)
+            return LinkTerm(scaled, name, size, on, nominal, form == LESS)
         fluid = "ambient" if "ambient" in machine.inputs else machine.reference_temperature
         return CoolingTerm(name, amplitude("conductance", usual, "W/K"), spread, on, fluid)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """State size and intervals of the cooling."""
         size = reported.get("conductance") or reported["heat"]
-        if candidate.terms[0].coefficients:
+        term = candidate.terms[0]
+        if term.coefficients:
+            amount = f"{quantity(size)} less" if term.less else f"a further {quantity(size)}"
             return (
-                f"{capital(place_words(candidate.component))} conducts a further {quantity(size)}"
+                f"{capital(place_words(candidate.component))} conducts {amount}"
                 f"{when_words(candidate, reported)}."
             )
         way = " to the surroundings" if size.unit == "W/K" else ""

@@ -10,6 +10,7 @@ from spindle_fem.effects.framework.laws import amplitude
 from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
 from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.unrecorded import (
+    LESS,
     Share,
     SourceTerm,
     UnrecordedEffect,
@@ -74,7 +75,8 @@ class UnrecordedHeatSource(UnrecordedEffect):
         usual = self.usual(machine, form)
         if scaled:
             nominal = machine.source_heat[scaled]
-            return SourceTerm(name, amplitude("heat", max(usual, nominal), "W"), on, scaled, nominal)
+            size = amplitude("heat", max(usual, nominal), "W")
+            return SourceTerm(scaled, name, size, on, nominal, form == LESS)
         return UnrecordedHeatTerm(name, amplitude("heat", usual, "W"), spread, on)
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
@@ -82,8 +84,9 @@ class UnrecordedHeatSource(UnrecordedEffect):
         source = next(iter(candidate.terms[0].bearings), "")
         if source:
             more = reported["heat"].value / candidate.constants["nominal"]
+            times = 1.0 - more if candidate.terms[0].less else 1.0 + more
             return (
-                f"{source.replace('_', ' ')} heats {1.0 + more:.2f} times as much while on"
+                f"{source.replace('_', ' ')} heats {times:.2f} times as much while on"
                 f"{when_words(candidate, reported)}."
             )
         return (

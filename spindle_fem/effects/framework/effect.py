@@ -393,13 +393,17 @@ class IntervalEffect(Effect):
     Attributes
     ----------
     interval_forms : tuple of str
-        Forms that :meth:`over` takes, the usual one first.
+        Forms that :meth:`over` takes anywhere, the usual one first.
     takes_heat_away : bool
         Whether heat over the intervals leaves the machine.
     """
 
     interval_forms: tuple[str, ...] = ("",)
     takes_heat_away: bool = False
+
+    def forms_at(self, machine: MachineView, spot: str) -> tuple[str, ...]:
+        """Forms that :meth:`over` takes at a spot."""
+        return self.interval_forms
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Those that follow laws; candidates for intervals come from the data."""
@@ -443,7 +447,7 @@ class IntervalEffect(Effect):
             One of :meth:`places`.
         intervals : sequence of (float, float), [s]
         form : str, optional
-            One of :attr:`interval_forms`; the first when None.
+            One of :meth:`forms_at`; the first when None.
         course : str
             What is free about them.
         sizes : sequence of float

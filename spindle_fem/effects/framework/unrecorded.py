@@ -33,6 +33,8 @@ EDGE_WIDTH, EDGE_SHARE = 20.0, 0.1
 # intervals of one size, and of steps that each have their own.
 EDGE_SIGMA = 300.0
 JITTER, STEP_SIGMA = 0.1, 0.7
+# Form of what is less in intervals than at other times, a link or a source, and how much of it at most.
+LESS, MOST_LOST = "less", 0.95
 # Courses over time that intervals may describe.
 PULSES, STEPS, STATES = "pulses", "steps", "states"
 # Intervals that are nearer than this touch, s.
@@ -269,23 +271,39 @@ class UnrecordedHeatTerm(UnrecordedTerm):
         return self.spread.heat(context, self._sign * context.parameters["heat"] * self.on.share(context))
 
 
-class SourceTerm(UnrecordedTerm):
-    """A source of a network that heats more: ``1 + Q / Q_0`` times as much.
+class ScaledTerm(UnrecordedTerm):
+    """A link or a source of a network that is larger, or smaller, by a size.
 
     Parameters
     ----------
-    source : str
-    nominal : float, [W]
-        Its mean heat while it is on; the size counts in units of what a fit makes of that.
+    nominal : float, [W or W/K]
+        What the definition gives it, of a source its mean heat while it is on; the size counts in units of
+        what a fit makes of that.
+    less : bool
+        Whether it is smaller.
     """
 
-    def __init__(self, name: str, size: TermParameter, on: Share, source: str, nominal: float) -> None:
-        super().__init__(name, size, Spread(()), on)
-        self.bearings, self._nominal = (source,), nominal
+    def __init__(self, name: str, size: TermParameter, on: Share, nominal: float, less: bool) -> None:
+        limit = MOST_LOST * nominal if less else np.inf
+        super().__init__(name, replace(size, high=limit), Spread(()), on)
+        self.nominal, self.less = nominal, less
+
+    def factor_of(self, context: TermContext) -> Complex:
+        """Factor on it, (1, k)."""
+        size = context.parameters[self.parameters[0].name] * self.on.share(context) / self.nominal
+        return rows(context, 1.0 - size if self.less else 1.0 + size)
+
+
+class SourceTerm(ScaledTerm):
+    """A source of a network that heats more or less: ``1 ± Q / Q_0`` times as much."""
+
+    def __init__(self, source: str, *more: Any) -> None:
+        super().__init__(*more)
+        self.bearings = (source,)
 
     def friction(self, context: TermContext) -> Complex:
         """Factor on the source's heat, (1, k)."""
-        return rows(context, 1.0 + context.parameters["heat"] * self.on.share(context) / self._nominal)
+        return self.factor_of(context)
 
 
 class UnrecordedEffect(IntervalEffect):
@@ -320,6 +338,11 @@ class UnrecordedEffect(IntervalEffect):
     @abstractmethod
     def followed(self, machine: MachineView) -> Sequence[RecordedQuantity]:
         """Recorded quantities that it may follow."""
+
+    def forms_at(self, machine: MachineView, spot: str) -> tuple[str, ...]:
+        """Links and sources of a network may also be less than at other times."""
+        scaled = self.link(machine, spot) or self.source(machine, spot)
+        return (*self.interval_forms, LESS) if scaled else self.interval_forms
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
         """Laws of recorded quantities, each at every spot, in the first form.
