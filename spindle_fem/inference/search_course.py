@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from spindle_fem.inference import tuned
+from spindle_fem.inference.hidden_states import without
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search
 from spindle_fem.inference.neighbouring_sets import exchanged, reduced, widened
-from spindle_fem.inference.state_search import WORTH_ANOTHER, add_states, settle_best
+from spindle_fem.inference.state_search import WORTH_ANOTHER, add_states, settle_best, simulated
 from spindle_fem.inference.step_search import add_steps
 
 
@@ -64,8 +65,19 @@ def run_search(search: Search) -> list[Hypothesis]:
         _what_changes(search, null)
     settle_best(search)
     if is_network:
+        _levels_beside(search)
         _beside(search)
     return search.ranked()
+
+
+def _levels_beside(search: Search) -> None:
+    """Levels in the stead of what the best set has in intervals: its other effects hid them at first."""
+    fit = search.ranked()[0].fit
+    events = [c for c in fit.candidates if search.in_intervals(c)]
+    if len(fit.candidates) > 1 and len(events) == 1 and not search.is_hidden_state(events[0]):
+        about = simulated(search, *without(fit, events[0]))
+        if about is not None:
+            add_steps(search, about)
 
 
 def _beside(search: Search) -> None:

@@ -179,7 +179,7 @@ def _settle_again(search: Search, fit: Fit, candidate: Candidate) -> None:
     settle(search, fit, place, again, candidate)
     for other in fit.candidates:
         if other is not candidate:
-            begun = _simulated(search, *without(fit, other))
+            begun = simulated(search, *without(fit, other))
             if begun is not None:
                 settle(search, begun, place, again, candidate)
     twin = _twin(search, fit, place, candidate, tuned.FAIR_SHARE * again.log_evidence)
@@ -187,7 +187,7 @@ def _settle_again(search: Search, fit: Fit, candidate: Candidate) -> None:
         settle(search, fit, *twin, candidate)
 
 
-def _simulated(search: Search, candidates: tuple[Candidate, ...], values: Mapping[str, float]) -> Fit | None:
+def simulated(search: Search, candidates: tuple[Candidate, ...], values: Mapping[str, float]) -> Fit | None:
     """A fit; None where the set cannot be simulated."""
     try:
         return search.problem.fit(candidates, values)
@@ -276,7 +276,7 @@ def settle(
         candidate = _candidate(search, place, intervals, course)
         factor = values.get(candidate.sized_by, 1.0)
         start = values | {amplitude_name(candidate): course.size / factor}
-        fitted = _simulated(search, (*rest, candidate), start)
+        fitted = simulated(search, (*rest, candidate), start)
         if fitted is None:
             return
         paid = course.log_choice + len(course.chain.begin) * float(np.log(len(course.on)))
