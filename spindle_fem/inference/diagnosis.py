@@ -38,6 +38,7 @@ from spindle_fem.inference.robust_size import huber
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.state_search import Told, told_states
+from spindle_fem.inference.unseen_moments import unseen_moments
 from spindle_fem.inference.verdict import Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
@@ -75,6 +76,8 @@ class Diagnosis:
         Direction whose prior was given up.
     states : mapping of str to Told
         Hidden states of the chosen set inferred from all readings, by the name of their amplitude.
+    moments : mapping of str to float
+        Moments of the chosen set within held-out stretches, from all readings, by name [s].
     """
 
     predictor: Predictor
@@ -91,6 +94,7 @@ class Diagnosis:
     seconds: Mapping[str, float]
     wrong: WrongDirection | None = None
     states: Mapping[str, Told] = field(default_factory=dict)
+    moments: Mapping[str, float] = field(default_factory=dict)
 
     def told(self, candidate: Candidate) -> Candidate:
         """A candidate of the chosen set, with its intervals inferred from all readings if it switches."""
@@ -235,6 +239,7 @@ def diagnose_recordings(
         clock.laps,
         wrong,
         readings.states(judgement.chosen.fit),
+        readings.moments(judgement.chosen.fit),
     )
 
 
@@ -280,6 +285,7 @@ class _Readings:
         self._follow = follow
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
         self._states: dict[int, tuple[Fit, Mapping[str, Told]]] = {}
+        self._moments: dict[int, tuple[Fit, Mapping[str, float]]] = {}
 
     def apart(self, one: Fit, other: Fit) -> float:
         """Root mean square of the difference over the noise, in the channel where it is largest."""
@@ -323,15 +329,16 @@ class _Readings:
         )
 
     def _followed(self, fit: Fit, seen: Sequence[Observation]) -> list[Array]:
-        """Predicted readings; switching states follow all readings, held-out ones included.
+        """Predicted readings; switching states and moments follow all readings, held-out ones included.
 
         Where a state is not known within a held-out block, the readings after it miss its heat.
         """
-        plant, states = self._plant, self.states(fit)
+        plant, states, moments = self._plant, self.states(fit), self.moments(fit)
         told = self._told(fit)
-        if states:
+        if states or moments:
             own = tuple(states[c.amplitude].candidate if c.amplitude in states else c for c in fit.candidates)
-            told = [plant.predict(n, fit.values, own).temperature for n in range(len(plant.recordings))]
+            values = fit.values | dict(moments)
+            told = [plant.predict(n, values, own).temperature for n in range(len(plant.recordings))]
         return [item.at(told[item.recording][:, item.channel]) for item in seen]
 
     def states(self, fit: Fit) -> Mapping[str, Told]:
@@ -339,6 +346,12 @@ class _Readings:
         if id(fit) not in self._states:
             self._states[id(fit)] = fit, self._follow(fit)
         return self._states[id(fit)][1]
+
+    def moments(self, fit: Fit) -> Mapping[str, float]:
+        """Moments of a fit within held-out stretches."""
+        if id(fit) not in self._moments:
+            self._moments[id(fit)] = fit, unseen_moments(self._plant, fit)
+        return self._moments[id(fit)][1]
 
     def kept(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Sets without those that predict held-out readings worse than some of their effects alone."""

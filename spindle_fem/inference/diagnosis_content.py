@@ -93,11 +93,16 @@ def diagnosis_content(
 
 
 def _told(diagnosis: Diagnosis) -> dict[str, float]:
-    """Held-out error with states from all readings, at parameters fitted without held-out readings."""
-    if not diagnosis.states:
+    """Held-out error with states and moments from all readings, at parameters fitted without held-out ones."""
+    final, moments = diagnosis.final, diagnosis.moments
+    if not (diagnosis.states or moments):
         return {}
-    final = diagnosis.final
-    told = replace(final, candidates=tuple(diagnosis.told(item) for item in final.candidates))
+    moved = zip(final.coordinates, final.position, strict=True)
+    told = replace(
+        final,
+        candidates=tuple(diagnosis.told(item) for item in final.candidates),
+        position=np.array([c.of(moments[c.name]) if c.name in moments else u for c, u in moved]),
+    )
     predicted = predictions_at_stamps(diagnosis.predictor, told)
     return {"heldout_states_told_rmse_K": rmse(diagnosis.predictor, predicted, heldout=True)}
 

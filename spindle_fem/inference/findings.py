@@ -79,7 +79,8 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
     reported = {name: Reported(item["value"], item["unit"]) for name, item in parameters.items()}
     state = diagnosis.states.get(candidate.amplitude)
     candidate = diagnosis.told(candidate)
-    values = candidate_values(candidate, fit.values)
+    moments = diagnosis.moments if fit is diagnosis.final else {}
+    values = candidate_values(candidate, fit.values | dict(moments))
     intervals = []
     if in_intervals(effect, candidate):
         pairs = effect.intervals(candidate, values)
