@@ -93,7 +93,7 @@ def diagnosis_content(
 
 
 def _told(diagnosis: Diagnosis) -> dict[str, float]:
-    """Held-out error with states and moments from all readings, at parameters fitted without held-out ones."""
+    """Held-out error with states and moments from all readings, at parameters fitted without these."""
     final, moments = diagnosis.final, diagnosis.moments
     if not (diagnosis.states or moments):
         return {}

@@ -10,9 +10,13 @@ import random
 import shutil
 import tomllib
 import zipfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+
+from spindle_fem.model.reduced.reduced_cache import KeptBasis
+from spindle_fem.model.thermal_model import ThermalModel
 
 from .child import Surroundings, run_command, run_function
 from .judged import ACCEPTED, Record
@@ -125,14 +129,20 @@ def _filled(table: dict[str, object]) -> dict[str, object]:
 def _try_cache(record: Record, chance: random.Random, folder: Path, originals: Path) -> None:
     cache = folder / CACHE
     shutil.copytree(originals / CACHE, cache)
-    model = next(cache.glob("reduced-*.npz"))
+    model, basis = (next(cache.glob(f"{kind}-*.npz")) for kind in ("reduced", "basis"))
     if chance.random() < SHARE_MODELS:
-        sound = model.read_bytes()
-        record.done = ["model", _spoil_entry(chance, model)]
-        record.step("model", run_function(lambda: _load_model(model, sound), folder))
+        file, load, names = chance.choice(
+            (
+                (model, ThermalModel.load, ThermalModel.__slots__),
+                (basis, lambda path: KeptBasis.beside(model), KeptBasis.__slots__),
+            )
+        )
+        sound = file.read_bytes()
+        record.done = [file.name.partition("-")[0], _spoil_entry(chance, file)]
+        record.step("model", run_function(lambda: _read_again(file, sound, load, names), folder))
         return
     # the mesh is read only where the model is not there
-    file = next(path for path in cache.glob("*.npz") if path != model)
+    file = next(path for path in cache.glob("*.npz") if path not in (model, basis))
     record.done = ["mesh", _spoil_entry(chance, file)]
     around = Surroundings({"SPINDLE_FEM_CACHE": str(cache)})
     if record.step("mesh", run_command(list(MESH), folder, around)) == ACCEPTED:
@@ -142,16 +152,14 @@ def _try_cache(record: Record, chance: random.Random, folder: Path, originals: P
             record.fault("the damaged entry was not replaced")
 
 
-def _load_model(file: Path, sound: bytes) -> int:
-    """Status 0 if an entry is read as it was, or not at all: then the model is made again."""
-    from spindle_fem.model.thermal_model import ThermalModel
-
-    found = ThermalModel.load(file)
+def _read_again(file: Path, sound: bytes, load: Callable[[Path], object | None], names: Sequence[str]) -> int:
+    """Status 0 if an entry is read as it was, or not at all: then it is made again."""
+    found = load(file)
     if found is None:
         return 0
     file.write_bytes(sound)
-    was = ThermalModel.load(file)
-    return int(any(not _same(getattr(found, name), getattr(was, name)) for name in ThermalModel.__slots__))
+    was = load(file)
+    return int(any(not _same(getattr(found, name), getattr(was, name)) for name in names))
 
 
 def _same(one: object, other: object) -> bool:
@@ -159,7 +167,7 @@ def _same(one: object, other: object) -> bool:
 
 
 def _holds(file: Path) -> bool:
-    with contextlib.suppress(OSError, ValueError, zipfile.BadZipFile), np.load(file) as data:
+    with contextlib.suppress(OSError, ValueError, EOFError, zipfile.BadZipFile), np.load(file) as data:
         return "header" in data.files
     return False
 
