@@ -24,6 +24,7 @@ from spindle_fem.inference.worker_processes import FitOrder, Workers, fit_order
 from spindle_fem.parallel import worker_pool
 from spindle_fem.recordings.align import read_recording
 from tests.support.flawed_network import (
+    COVERED,
     DURATION,
     HEAT,
     HOT,
@@ -31,6 +32,7 @@ from tests.support.flawed_network import (
     MACHINE,
     STEP,
     as_built,
+    covered,
     hot,
     record,
 )
@@ -83,6 +85,25 @@ def test_a_link_beyond_what_the_calibration_told_is_a_parameter(machine, tmp_pat
     assert factor["low"] < 0.55 < factor["high"]
     assert content["fit"]["after"]["heldout_rmse_K"] < 0.13 < content["fit"]["before"]["heldout_rmse_K"]
     require_probabilities(content)
+
+
+def test_cooling_that_is_less_for_a_while_than_the_calibration_told(machine, tmp_path):
+    """Its first change falls into a held-out stretch, whose readings tell the moment."""
+    earlier = record(tmp_path / "earlier", 9)
+    run = record(tmp_path / "run", 19, built=as_built(9), share=covered)
+    content = diagnose_without_report(machine, [run], tmp_path / "out", [earlier])
+    assert content["verdict"] == "missing_physics"
+    assert effects(content) == {("unrecorded_cooling", "body|ambient")}
+    (finding,) = content["findings"]
+    ((start, end),) = [(item["start"], item["end"]) for item in finding["intervals"]]
+    assert (start, end) == (pytest.approx(COVERED[0], abs=120.0), pytest.approx(COVERED[1], abs=120.0))
+    conductance = finding["parameters"]["conductance"]
+    assert conductance["value"] == pytest.approx(0.5 * as_built(9)["body|ambient"], rel=0.1)
+    assert " less " in finding["statement"]
+    assert content["fit"]["after"]["heldout_states_told_rmse_K"] < 0.13
+    # The definition that is written takes it up again.
+    again = simulate_machine(tmp_path / "out" / "improved_machine.toml", run, tmp_path / "again")
+    assert all(item["rmse_K"] < 0.2 for item in again["channels"])
 
 
 @pytest.mark.slow

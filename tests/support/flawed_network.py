@@ -53,15 +53,26 @@ def inputs_at(time):
     return row[1], row[2], 21.0 + 1.5 * np.sin(time / 4000.0)
 
 
-def temperatures(built, times, extra=lambda time: 0.0):
-    """Of the nodes by an adaptive integrator, restarted where an input jumps; ``extra`` heats the body."""
+# When a cover hangs before the body's fins.
+COVERED = (4700.0, 9000.0)
+
+
+def covered(time):
+    return 0.5 if COVERED[0] <= time < COVERED[1] else 1.0
+
+
+def temperatures(built, times, extra=lambda time: 0.0, share=lambda time: 1.0):
+    """Of the nodes by an adaptive integrator, restarted where an input jumps.
+
+    ``extra`` heats the body, ``share`` of whose cooling is left.
+    """
 
     def slope(time, state):
         power, speed, room = inputs_at(min(time, stop - 1e-6))
         winding, bearing, body = state
         one = built["winding|body"] * (winding - body)
         two = built["bearing|body"] * (bearing - body)
-        out = built["body|ambient"] * (body - room)
+        out = share(time) * built["body|ambient"] * (body - room)
         heat = built["speed"] * (speed / 1000.0) ** 1.5
         return [
             (built["power"] * power - one) / built["winding"],
@@ -70,7 +81,8 @@ def temperatures(built, times, extra=lambda time: 0.0):
         ]
 
     state, found = np.full(3, inputs_at(0.0)[2]), np.empty((times.size, 3))
-    edges = np.unique([row[0] for row in PROGRAMME] + [e for pair in HOT for e in pair] + [times[-1]])
+    switched = [edge for pair in (*HOT, COVERED) for edge in pair]
+    edges = np.unique([row[0] for row in PROGRAMME] + switched + [times[-1]])
     for start, stop in pairwise(edges):
         own = (times >= start) & (times < stop)
         wanted = np.append(times[own], stop)
@@ -88,14 +100,14 @@ def hot(time):
     return HEAT if any(start <= time < end for start, end in HOT) else 0.0
 
 
-def record(folder, seed, *, built=None, extra=lambda time: 0.0, reading=None, times=None, beside=None):
+def record(folder, seed, *, built=None, reading=None, times=None, beside=None, **physics):
     """Write a recording; ``reading`` turns the temperatures (N, 3) into what the sensors tell.
 
-    ``beside`` is what a covariate told over time.
+    ``beside`` is what a covariate told over time, ``physics`` as :func:`temperatures` has it.
     """
     folder.mkdir(parents=True)
     times = np.arange(0.0, DURATION + 1.0, STEP) if times is None else times
-    told = temperatures(as_built(seed) if built is None else built, times, extra)
+    told = temperatures(as_built(seed) if built is None else built, times, **physics)
     if reading is not None:
         told = reading(times, told)
     told = told + np.random.default_rng(seed).normal(0.0, 0.1, told.shape)
