@@ -12,8 +12,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from spindle_fem.effects.framework.effect import Candidate
-from spindle_fem.errors import ConvergenceError
-from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit
 from spindle_fem.inference.missing_heat import stretches
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.robust_size import huber
@@ -22,18 +21,27 @@ from spindle_fem.inference.robust_size import huber
 OF_INTERVALS, OF_SENSORS = ("start_", "end_"), ("start", "time")
 # Moments tried over a stretch before the best of them is refined, and how closely, as a share of the stretch.
 TRIED, CLOSENESS = 9, 0.01
+# A moment may lie in a stretch beside it if, at its near end, the readings are this little less likely.
+FLAT = 10.0
 
 
 def unseen_moments(predictor: Predictor, fit: Fit) -> dict[str, float]:
-    """Values of the moments that lie in held-out stretches, by name [s]; everything else as it was fitted."""
+    """Values of the moments that may lie in held-out stretches, by name [s]; all else as it was fitted.
+
+    In the stretch in which the fit has it, and in those next to it up to which fitted readings do not tell.
+    """
     found: dict[str, float] = {}
-    values = fit.values
     for candidate, name in _moments(fit):
         number = candidate.recording or 0
-        use, times = predictor.use[number], predictor.recordings[number].times
-        for begin, end in stretches(~use, times):
-            if begin <= values[name] <= end:
-                found[name] = _best(predictor, fit, values | found, name, (begin, end))
+        held = stretches(~predictor.use[number], predictor.recordings[number].times)
+        told = _Told(predictor, fit, fit.values | found, name)
+        best = told.moment
+        for begin, end in held:
+            inside = begin <= told.moment <= end
+            if inside or told.cost_at(min(max(told.moment, begin), end)) < told.cost + FLAT:
+                best = min(best, told.best_within(begin, end), key=told.cost_at)
+        if best != told.moment:
+            found[name] = best
     return found
 
 
@@ -47,20 +55,29 @@ def _moments(fit: Fit) -> Iterator[tuple[Candidate, str]]:
                 yield candidate, name
 
 
-def _best(
-    predictor: Predictor, fit: Fit, values: Mapping[str, float], name: str, within: tuple[float, float]
-) -> float:
-    """The moment with the least misfit of all readings, where the set can be simulated with it."""
-    seen = (*predictor.observations, *predictor.heldout)
+class _Told:
+    """Misfit of all readings over one moment."""
 
-    def misfit(moment: float) -> float:
-        moved = {**values, name: moment}
+    def __init__(self, predictor: Predictor, fit: Fit, values: Mapping[str, float], name: str) -> None:
+        self._predictor, self._fit, self._values, self._name = predictor, fit, values, name
+        self._known: dict[float, float] = {}
+        self.moment = values[name]
+        self.cost = self.cost_at(self.moment)
+
+    def cost_at(self, moment: float) -> float:
+        """Robust sum of squares over the white noise; infinite where the set cannot be simulated."""
+        if moment not in self._known:
+            self._known[moment] = self._cost(moment)
+        return self._known[moment]
+
+    def _cost(self, moment: float) -> float:
+        predictor, values = self._predictor, {**self._values, self._name: moment}
         try:
             told = [
-                predictor.predict(number, moved, fit.candidates).temperature
+                predictor.predict(number, values, self._fit.candidates).temperature
                 for number in range(len(predictor.recordings))
             ]
-        except ConvergenceError:
+        except NOT_SIMULATED:
             return np.inf
         return sum(
             float(
@@ -68,15 +85,18 @@ def _best(
                     huber((item.at(told[item.recording][:, item.channel]) - item.values) / item.bins.white)
                 )
             )
-            for item in seen
+            for item in (*predictor.observations, *predictor.heldout)
         )
 
-    tried = [*np.linspace(*within, TRIED), values[name]]
-    costs = [misfit(moment) for moment in tried]
-    best = tried[int(np.argmin(costs))]
-    step = (within[1] - within[0]) / (TRIED - 1)
-    bounds = max(within[0], best - step), min(within[1], best + step)
-    closer = minimize_scalar(
-        misfit, bounds=bounds, method="bounded", options={"xatol": CLOSENESS * (within[1] - within[0])}
-    )
-    return float(closer.x) if closer.fun < min(costs) else float(best)
+    def best_within(self, begin: float, end: float) -> float:
+        """The best moment between two."""
+        tried = [float(moment) for moment in np.linspace(begin, end, TRIED)]
+        best = min(tried, key=self.cost_at)
+        step = (end - begin) / (TRIED - 1)
+        closer = minimize_scalar(
+            self.cost_at,
+            bounds=(max(begin, best - step), min(end, best + step)),
+            method="bounded",
+            options={"xatol": CLOSENESS * (end - begin)},
+        )
+        return min(best, float(closer.x), key=self.cost_at)
