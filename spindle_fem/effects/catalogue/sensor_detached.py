@@ -18,6 +18,8 @@ from spindle_fem.effects.framework.term import TermParameter
 LOOSE = "from the start"
 # Width of the edge with which it comes off, s, and 1 σ of its logarithm: a clamp opens, glue creeps.
 EDGE = (30.0, 1.0)
+# Readings whose means are compared where it may have come off: at least, and parts of a recording.
+JUMP_ROWS, JUMP_PARTS = 5, 100
 # Time constant of a small sensor in still air, s (4 g of steel on 5 cm² at 6 W/(m²K)); 1 σ of its logarithm.
 TIME_IN_AIR = (600.0, 0.8)
 
@@ -60,6 +62,33 @@ class DetachedReading(Reading):
         return first_order_lag(times, values + share * (air - values), lag)
 
 
+def sharpest_jumps(times: Array, residual: Array) -> list[float]:
+    """Instant of the largest difference between the means shortly after and before it, of every channel [s].
+
+    Parameters
+    ----------
+    times : (N,) ndarray, [s]
+    residual : (N, c) ndarray, [K]
+        NaN where nothing was read.
+
+    Examples
+    --------
+    >>> sharpest_jumps(np.arange(100.0), np.where(np.arange(100.0) < 63, 0.0, 2.0)[:, None])
+    [63.0]
+    """
+    found = []
+    for column in residual.T:
+        rows = np.flatnonzero(np.isfinite(column))
+        width = max(JUMP_ROWS, rows.size // JUMP_PARTS)
+        if rows.size < 2 * width:
+            continue
+        total = np.concatenate(([0.0], np.cumsum(column[rows])))
+        means = (total[width:] - total[:-width]) / width
+        apart = np.abs(means[width:] - means[:-width])
+        found.append(float(times[rows[width + int(np.argmax(apart))]]))
+    return found
+
+
 class SensorDetached(SensorEffect):
     """A sensor that has lost its contact reads a mix of the part and the air."""
 
@@ -95,6 +124,16 @@ class SensorDetached(SensorEffect):
             "": ((share, time, edge, in_air), 0.5, starts),
             LOOSE: ((share, in_air), 0.3, ({},)),
         }
+
+    def starts_from(
+        self, candidate: Candidate, times: Array, residual: Array
+    ) -> tuple[Mapping[str, float], ...]:
+        """Beside even instants those of the most abrupt departures: a fit does not move an edge far."""
+        if candidate.form == LOOSE:
+            return candidate.starts
+        outer = f"{candidate.reading.name}.time"
+        sharp = [{outer: moment} for moment in sharpest_jumps(times, residual)]
+        return (*candidate.starts, *sharp)
 
     def reading(self, channel: str, name: str, form: str, parameters: tuple[TermParameter, ...]) -> Reading:
         """Reading of a channel; the air is at the reference temperature if no input gives it."""
