@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -16,14 +16,13 @@ from spindle_fem.effects.registry import candidates_for, catalogue, interval_eff
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.candidate_response import variants_of
+from spindle_fem.inference.followed_readings import Followed, FollowedReadings
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.hypothesis_search import Search
-from spindle_fem.inference.input_sampling import left_over_noise
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
-from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import (
@@ -33,12 +32,9 @@ from spindle_fem.inference.prepared_problem import (
     with_inexact_laws,
     with_own_noise,
 )
-from spindle_fem.inference.reading_noise import ChannelBins, Whitener
-from spindle_fem.inference.robust_size import huber
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.state_search import Told, told_states
-from spindle_fem.inference.unseen_moments import unseen_moments
 from spindle_fem.inference.verdict import Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
@@ -74,10 +70,8 @@ class Diagnosis:
     seconds : mapping of stage to float
     wrong : WrongDirection or None
         Direction whose prior was given up.
-    states : mapping of str to Told
-        Hidden states of the chosen set inferred from all readings, by the name of their amplitude.
-    moments : mapping of str to float
-        Moments of the chosen set within held-out stretches, from all readings, by name [s].
+    followed : Followed or None
+        The chosen set with states and moments that all readings tell.
     """
 
     predictor: Predictor
@@ -93,14 +87,17 @@ class Diagnosis:
     candidates_tried: int
     seconds: Mapping[str, float]
     wrong: WrongDirection | None = None
-    states: Mapping[str, Told] = field(default_factory=dict)
-    moments: Mapping[str, float] = field(default_factory=dict)
+    followed: Followed | None = None
 
-    def told(self, candidate: Candidate) -> Candidate:
-        """A candidate of the chosen set, with its intervals inferred from all readings if it switches."""
-        chosen = any(c is candidate for c in self.final.candidates)
-        own = self.states.get(candidate.amplitude) if chosen else None
-        return candidate if own is None else own.candidate
+    @property
+    def told(self) -> Fit:
+        """The chosen set as it is told: with hidden states from all readings, else as it was fitted."""
+        return self.followed.fit if self.followed and self.followed.states else self.final
+
+    def state(self, candidate: Candidate) -> Told | None:
+        """Hidden state that a candidate of the chosen set is; None for others."""
+        chosen = any(c is candidate for c in (*self.final.candidates, *self.told.candidates))
+        return self.followed.states.get(candidate.amplitude) if chosen and self.followed else None
 
     @property
     def machine_coordinates(self) -> tuple[Coordinate, ...]:
@@ -190,7 +187,7 @@ def diagnose_recordings(
         predictor = with_misdescriptions(predictor, directions, best.fit.values, best.fit.candidates)
     final = Problem(predictor, belief, slow, predictor.observations)
     overlapping = overlapping_components(view)
-    refitted = _refit(final, found, workers, overlapping, _Readings(final, final), coarseness)
+    refitted = _refit(final, found, workers, overlapping, FollowedReadings(final, final), coarseness)
     # Nothing missing is the likelier of what directions do about its own run and about that of the set.
     plain = Problem(unchanged, belief, slow, predictor.observations)
     own = plain.fit((), empty.fit.values)
@@ -198,7 +195,7 @@ def diagnose_recordings(
     if after.misfit_with_prior < own.misfit_with_prior:
         unchanged, plain, own = predictor, final, after
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
-    readings = _Readings(final, plain, lambda fit: told_states(search, final, fit))
+    readings = FollowedReadings(final, plain, lambda fit: told_states(search, final, fit))
     refitted = with_own_noise(plain, readings.residuals, readings.kept(refitted))
     refitted = [replace(h, heldout=readings.heldout_misfit(h.fit)) for h in refitted]
     clock.lap("final fits")
@@ -238,8 +235,7 @@ def diagnose_recordings(
         tried,
         clock.laps,
         wrong,
-        readings.states(judgement.chosen.fit),
-        readings.moments(judgement.chosen.fit),
+        readings.followed(judgement.chosen.fit),
     )
 
 
@@ -262,141 +258,12 @@ def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:
     return {name: frozenset(family) for name, family in found.items()}
 
 
-class _Readings:
-    """Predicted readings of fits, and residuals of single readings.
-
-    Parameters
-    ----------
-    final, plain : Problem
-        With effects, and with nothing missing.
-    follow : callable
-        Hidden states of a fit from all readings, as :func:`told_states` gives them.
-    """
-
-    def __init__(
-        self,
-        final: Problem,
-        plain: Problem,
-        follow: Callable[[Fit], Mapping[str, Told]] = lambda fit: {},
-    ) -> None:
-        self._plant, self._unchanged = final.predictor, plain.predictor
-        self._slow = final.slow
-        self._whiteners = [Whitener(item.bins, final.slow) for item in self._plant.heldout]
-        self._follow = follow
-        self._known: dict[int, tuple[Fit, list[Array]]] = {}
-        self._states: dict[int, tuple[Fit, Mapping[str, Told]]] = {}
-        self._moments: dict[int, tuple[Fit, Mapping[str, float]]] = {}
-
-    def apart(self, one: Fit, other: Fit) -> float:
-        """Root mean square of the difference over the noise, in the channel where it is largest."""
-        largest = 0.0
-        for item, first, second in zip(self._plant.observations, self._of(one), self._of(other), strict=True):
-            slow = self._slow.of(item.bins.key).sigma if item.bins.is_relative else self._slow.sigma
-            noise = np.hypot(self._plant.recordings[item.recording].sigma[item.channel], slow)
-            apart = first - second
-            if item.bins.is_relative:
-                apart = apart - apart.mean()
-            largest = max(largest, float(np.sqrt(np.mean(apart**2))) / float(noise))
-        return largest
-
-    def left(self, fit: Fit) -> float:
-        """Root mean square residual of single readings over their noise, all channels weighted equally."""
-        plant = self._plant
-        return left_over_noise(plant, plant.observations, self._followed(fit, plant.observations), fit.values)
-
-    def residuals(self, fit: Fit) -> list[tuple[ChannelBins, Array]]:
-        """Predicted less read, K, averaged over the bins of every observation that was fitted."""
-        seen = self._plant.observations
-        told = self._followed(fit, seen)
-        return [(item.bins, values - item.values) for item, values in zip(seen, told, strict=True)]
-
-    def beyond(self, fit: Fit) -> float:
-        """Residual of held-out readings likewise; switching states follow all readings."""
-        plant = self._plant
-        if not plant.heldout:
-            return 0.0
-        return left_over_noise(plant, plant.heldout, self._followed(fit, plant.heldout), fit.values)
-
-    def heldout_misfit(self, fit: Fit) -> float | None:
-        """Minus twice the logarithm of their likelihood but for a constant, with the best set's error."""
-        if not self._whiteners:
-            return None
-        return sum(
-            float(np.sum(huber(white(item.values - told))))
-            for item, white, told in zip(
-                self._plant.heldout, self._whiteners, self._followed(fit, self._plant.heldout), strict=True
-            )
-        )
-
-    def _followed(self, fit: Fit, seen: Sequence[Observation]) -> list[Array]:
-        """Predicted readings; switching states and moments follow all readings, held-out ones included.
-
-        Where a state is not known within a held-out block, the readings after it miss its heat.
-        """
-        plant, states, moments = self._plant, self.states(fit), self.moments(fit)
-        told = self._told(fit)
-        if states or moments:
-            own = tuple(states[c.amplitude].candidate if c.amplitude in states else c for c in fit.candidates)
-            values = fit.values | dict(moments)
-            told = [plant.predict(n, values, own).temperature for n in range(len(plant.recordings))]
-        return [item.at(told[item.recording][:, item.channel]) for item in seen]
-
-    def states(self, fit: Fit) -> Mapping[str, Told]:
-        """Hidden states of a fit."""
-        if id(fit) not in self._states:
-            self._states[id(fit)] = fit, self._follow(fit)
-        return self._states[id(fit)][1]
-
-    def moments(self, fit: Fit) -> Mapping[str, float]:
-        """Moments of a fit within held-out stretches."""
-        if id(fit) not in self._moments:
-            self._moments[id(fit)] = fit, unseen_moments(self._plant, fit)
-        return self._moments[id(fit)][1]
-
-    def kept(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Sets without those that predict held-out readings worse than some of their effects alone."""
-        error = {id(h): self._heldout_error(h.fit) for h in hypotheses}
-        return [
-            h
-            for h in hypotheses
-            if not any(
-                other.keys < h.keys and error[id(h)] > tuned.WORSE_HELDOUT * error[id(other)]
-                for other in hypotheses
-            )
-        ]
-
-    def _heldout_error(self, fit: Fit) -> float:
-        """Root mean square error of held-out readings over their noise."""
-        errors = [
-            np.mean((predicted - item.values) ** 2) / item.bins.white**2
-            for item, predicted in zip(
-                self._plant.heldout, self._followed(fit, self._plant.heldout), strict=True
-            )
-        ]
-        return float(np.sqrt(np.mean(errors))) if errors else 0.0
-
-    def _of(self, fit: Fit) -> list[Array]:
-        told = self._told(fit)
-        return [item.at(told[item.recording][:, item.channel]) for item in self._plant.observations]
-
-    def _told(self, fit: Fit) -> list[Array]:
-        if id(fit) not in self._known:
-            plant = self._plant if fit.candidates else self._unchanged
-            told = [
-                plant.predict(number, fit.values, fit.candidates).temperature
-                for number in range(len(self._plant.recordings))
-            ]
-            # The fit is kept so that no other takes its identity.
-            self._known[id(fit)] = fit, told
-        return self._known[id(fit)][1]
-
-
 def _refit(
     problem: Problem,
     found: Sequence[Hypothesis],
     workers: Workers,
     overlapping: Mapping[str, frozenset[str]],
-    readings: _Readings,
+    readings: FollowedReadings,
     coarseness: float,
 ) -> list[Hypothesis]:
     """The most probable hypotheses, what reads nearly as the first, and the empty one, on the whole basis."""

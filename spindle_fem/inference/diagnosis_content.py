@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -93,17 +93,10 @@ def diagnosis_content(
 
 
 def _told(diagnosis: Diagnosis) -> dict[str, float]:
-    """Held-out error with states and moments from all readings, at parameters fitted without these."""
-    final, moments = diagnosis.final, diagnosis.moments
-    if not (diagnosis.states or moments):
+    """Held-out error with states and moments from all readings, sizes and laws without held-out ones."""
+    if diagnosis.followed is None or diagnosis.followed.fit is diagnosis.final:
         return {}
-    moved = zip(final.coordinates, final.position, strict=True)
-    told = replace(
-        final,
-        candidates=tuple(diagnosis.told(item) for item in final.candidates),
-        position=np.array([c.of(moments[c.name]) if c.name in moments else u for c, u in moved]),
-    )
-    predicted = predictions_at_stamps(diagnosis.predictor, told)
+    predicted = predictions_at_stamps(diagnosis.predictor, diagnosis.followed.fit)
     return {"heldout_states_told_rmse_K": rmse(diagnosis.predictor, predicted, heldout=True)}
 
 

@@ -73,14 +73,15 @@ def reported_parameters(fit: Fit, candidate: Candidate, seed: int = 0) -> dict[s
 
 
 def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: float) -> dict[str, Any]:
-    """One finding of a set."""
+    """One finding of a set; of the chosen one with states that all readings tell."""
     effect = effect_of(candidate.effect)
+    state = diagnosis.state(candidate)
+    if fit is diagnosis.final:
+        candidate = diagnosis.told.candidates[fit.candidates.index(candidate)]
+        fit = diagnosis.told
     parameters = reported_parameters(fit, candidate)
     reported = {name: Reported(item["value"], item["unit"]) for name, item in parameters.items()}
-    state = diagnosis.states.get(candidate.amplitude)
-    candidate = diagnosis.told(candidate)
-    moments = diagnosis.moments if fit is diagnosis.final else {}
-    values = candidate_values(candidate, fit.values | dict(moments))
+    values = candidate_values(candidate, fit.values)
     intervals = []
     if in_intervals(effect, candidate):
         pairs = effect.intervals(candidate, values)
@@ -94,7 +95,7 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
             for (start, end), size in zip(pairs, effect.sizes(candidate, values), strict=True)
         ]
     words = ""
-    if state is not None and state.candidate is candidate:
+    if state is not None:
         words = state.words
         intervals = [
             item | {"probability": share} for item, share in zip(intervals, state.probability, strict=True)

@@ -284,15 +284,22 @@ def _fitted(
         fitted = problem.fit(candidates, start | {amplitude_name(candidate): size}, hopeless=hopeless)
     except NOT_SIMULATED:
         return None
+    if not _changes(problem, place, _spans(place.effect, fitted)[0]):
+        # One level from start to end is another value, which its own effect names.
+        return None
     return Hypothesis(fitted, search.log_prior(candidates) - _paid(problem, place, intervals))
+
+
+def _changes(problem: Problem, place: StepPlace, intervals: Sequence[tuple[float, float]]) -> set[float]:
+    """Edges amid the recording, [s]."""
+    begin, *_, end = problem.predictor.drives[place.recording].grid
+    near = SHORTEST * (end - begin)
+    return {edge for pair in intervals for edge in pair if begin + near < edge < end - near}
 
 
 def _paid(problem: Problem, place: StepPlace, intervals: Sequence[tuple[float, float]]) -> float:
     """Cost of choosing the changes, as a logarithm; levels from the start or to the end cost nothing."""
-    begin, *_, end = problem.predictor.drives[place.recording].grid
-    near = SHORTEST * (end - begin)
-    edges = {edge for pair in intervals for edge in pair if begin + near < edge < end - near}
-    return choice(place.instants, len(edges))
+    return choice(place.instants, len(_changes(problem, place, intervals)))
 
 
 def _spans(effect: IntervalEffect, fit: Fit) -> tuple[list[tuple[float, float]], list[float]]:

@@ -88,7 +88,7 @@ def test_a_link_beyond_what_the_calibration_told_is_a_parameter(machine, tmp_pat
 
 
 def test_cooling_that_is_less_for_a_while_than_the_calibration_told(machine, tmp_path):
-    """Its first change falls into a held-out stretch, whose readings tell the moment."""
+    """Its first change falls into a held-out stretch, from 4320 s to 5040 s: fitted readings tell no more."""
     earlier = record(tmp_path / "earlier", 9)
     run = record(tmp_path / "run", 19, built=as_built(9), share=covered)
     content = diagnose_without_report(machine, [run], tmp_path / "out", [earlier])
@@ -96,7 +96,8 @@ def test_cooling_that_is_less_for_a_while_than_the_calibration_told(machine, tmp
     assert effects(content) == {("unrecorded_cooling", "body|ambient")}
     (finding,) = content["findings"]
     ((start, end),) = [(item["start"], item["end"]) for item in finding["intervals"]]
-    assert (start, end) == (pytest.approx(COVERED[0], abs=120.0), pytest.approx(COVERED[1], abs=120.0))
+    assert 4320.0 - STEP < start < 5040.0 + STEP
+    assert end == pytest.approx(COVERED[1], abs=120.0)
     conductance = finding["parameters"]["conductance"]
     assert conductance["value"] == pytest.approx(0.5 * as_built(9)["body|ambient"], rel=0.1)
     assert " less " in finding["statement"]

@@ -1,0 +1,173 @@
+"""Readings that fits predict, with states and moments that all readings tell, to judge between sets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.input_sampling import left_over_noise
+from spindle_fem.inference.observations import Observation
+from spindle_fem.inference.reading_noise import ChannelBins, Whitener
+from spindle_fem.inference.robust_size import huber
+from spindle_fem.inference.state_search import Told
+from spindle_fem.inference.unseen_moments import unseen_moments
+
+Array = NDArray[np.float64]
+
+# Steps of a fit about states that all readings tell: it begins near its end.
+FOLLOWED_STEPS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """A fit with states and moments that all readings tell.
+
+    Attributes
+    ----------
+    states : mapping of str to Told
+        Hidden states, by the name of their amplitude.
+    """
+
+    fit: Fit
+    states: Mapping[str, Told] = field(default_factory=dict)
+
+
+class FollowedReadings:
+    """Predicted readings of fits, and residuals of single readings.
+
+    Parameters
+    ----------
+    final, plain : Problem
+        With effects, and with nothing missing.
+    follow : callable
+        Hidden states of a fit from all readings, as :func:`told_states` gives them.
+    """
+
+    def __init__(
+        self,
+        final: Problem,
+        plain: Problem,
+        follow: Callable[[Fit], Mapping[str, Told]] = lambda fit: {},
+    ) -> None:
+        self._plant, self._unchanged, self._final = final.predictor, plain.predictor, final
+        self._slow = final.slow
+        self._whiteners = [Whitener(item.bins, final.slow) for item in self._plant.heldout]
+        self._follow = follow
+        self._known: dict[int, tuple[Fit, list[Array]]] = {}
+        self._followed: dict[int, tuple[Fit, Followed]] = {}
+
+    def apart(self, one: Fit, other: Fit) -> float:
+        """Root mean square of the difference over the noise, in the channel where it is largest."""
+        largest = 0.0
+        for item, first, second in zip(self._plant.observations, self._of(one), self._of(other), strict=True):
+            slow = self._slow.of(item.bins.key).sigma if item.bins.is_relative else self._slow.sigma
+            noise = np.hypot(self._plant.recordings[item.recording].sigma[item.channel], slow)
+            apart = first - second
+            if item.bins.is_relative:
+                apart = apart - apart.mean()
+            largest = max(largest, float(np.sqrt(np.mean(apart**2))) / float(noise))
+        return largest
+
+    def left(self, fit: Fit) -> float:
+        """Root mean square residual of single readings over their noise, all channels weighted equally."""
+        plant = self._plant
+        return left_over_noise(
+            plant, plant.observations, self._told_by_all(fit, plant.observations), fit.values
+        )
+
+    def residuals(self, fit: Fit) -> list[tuple[ChannelBins, Array]]:
+        """Predicted less read, K, averaged over the bins of every observation that was fitted."""
+        seen = self._plant.observations
+        told = self._told_by_all(fit, seen)
+        return [(item.bins, values - item.values) for item, values in zip(seen, told, strict=True)]
+
+    def beyond(self, fit: Fit) -> float:
+        """Residual of held-out readings likewise; switching states follow all readings."""
+        plant = self._plant
+        if not plant.heldout:
+            return 0.0
+        return left_over_noise(plant, plant.heldout, self._told_by_all(fit, plant.heldout), fit.values)
+
+    def heldout_misfit(self, fit: Fit) -> float | None:
+        """Minus twice the logarithm of their likelihood but for a constant, with the best set's error."""
+        if not self._whiteners:
+            return None
+        return sum(
+            float(np.sum(huber(white(item.values - told))))
+            for item, white, told in zip(
+                self._plant.heldout, self._whiteners, self._told_by_all(fit, self._plant.heldout), strict=True
+            )
+        )
+
+    def _told_by_all(self, fit: Fit, seen: Sequence[Observation]) -> list[Array]:
+        """Predicted readings with states and moments that follow all readings."""
+        followed = self.followed(fit)
+        told = self._told(followed.fit)
+        return [item.at(told[item.recording][:, item.channel]) for item in seen]
+
+    def followed(self, fit: Fit) -> Followed:
+        """The fit with states and moments that all readings tell, held-out ones included.
+
+        Where a state is not known within a held-out block, the readings after it miss its heat, and a fit
+        without it makes up for that: sizes and laws are fitted again, to the same readings as before.
+        """
+        if id(fit) not in self._followed:
+            states = self._follow(fit)
+            again = fit
+            if states:
+                own = tuple(
+                    states[c.amplitude].candidate if c.amplitude in states else c for c in fit.candidates
+                )
+                again = self._final.fit(own, fit.values, iterations=FOLLOWED_STEPS)
+            moments = unseen_moments(self._plant, again)
+            if moments:
+                moved = [
+                    c.of(moments[c.name]) if c.name in moments else u
+                    for c, u in zip(again.coordinates, again.position, strict=True)
+                ]
+                again = replace(again, position=np.array(moved))
+            self._followed[id(fit)] = fit, Followed(again, states)
+        return self._followed[id(fit)][1]
+
+    def kept(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Sets without those that predict held-out readings worse than some of their effects alone."""
+        error = {id(h): self._heldout_error(h.fit) for h in hypotheses}
+        return [
+            h
+            for h in hypotheses
+            if not any(
+                other.keys < h.keys and error[id(h)] > tuned.WORSE_HELDOUT * error[id(other)]
+                for other in hypotheses
+            )
+        ]
+
+    def _heldout_error(self, fit: Fit) -> float:
+        """Root mean square error of held-out readings over their noise."""
+        errors = [
+            np.mean((predicted - item.values) ** 2) / item.bins.white**2
+            for item, predicted in zip(
+                self._plant.heldout, self._told_by_all(fit, self._plant.heldout), strict=True
+            )
+        ]
+        return float(np.sqrt(np.mean(errors))) if errors else 0.0
+
+    def _of(self, fit: Fit) -> list[Array]:
+        told = self._told(fit)
+        return [item.at(told[item.recording][:, item.channel]) for item in self._plant.observations]
+
+    def _told(self, fit: Fit) -> list[Array]:
+        if id(fit) not in self._known:
+            plant = self._plant if fit.candidates else self._unchanged
+            told = [
+                plant.predict(number, fit.values, fit.candidates).temperature
+                for number in range(len(self._plant.recordings))
+            ]
+            # The fit is kept so that no other takes its identity.
+            self._known[id(fit)] = fit, told
+        return self._known[id(fit)][1]
