@@ -10,7 +10,7 @@ RESULT ?= runs/wu_tan_2016
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test setup lint lowest docs wheel-check reference study book proof hardening clean
+.PHONY: run test setup lint lowest docs wheel-check first-hour reference study book proof hardening clean
 
 run: $(READY)
 	$(BIN)/spindle-fem run -o $(RESULT)
@@ -39,6 +39,10 @@ $(READY): pyproject.toml constraints.txt scripts/setup.sh
 # A small run from an installed wheel, away from the source tree.
 wheel-check: $(READY)
 	bash scripts/wheel_check.sh $(BIN)/python
+
+# README's first hour from the wheel and its dependencies alone, in an empty environment.
+first-hour: $(READY)
+	bash scripts/first_hour.sh $(BIN)/python
 
 # The lowest versions that pyproject.toml allows, in an environment of their own, and a sample of the tests on them.
 lowest: $(READY)

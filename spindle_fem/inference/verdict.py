@@ -258,7 +258,7 @@ def judge(
         As :func:`tempered` has it.
     """
     if coarseness > 1.0:
-        hypotheses = _with_needed_events(hypotheses, left, beyond)
+        hypotheses = _without_parts(_with_needed_events(hypotheses, left, beyond), left, beyond)
     ranked = rank(hypotheses, coarseness)
     p_value = detection_p_value(hypotheses, trials, coarseness)
     empty = next(item for item in ranked if not item.fit.candidates)
@@ -417,6 +417,24 @@ def _with_needed_events(
         )
 
     return [item for item in hypotheses if not _free_in_time(item.fit) or needed(item)]
+
+
+def _without_parts(
+    hypotheses: Sequence[Hypothesis], left: Callable[[Fit], float], beyond: Callable[[Fit], float]
+) -> list[Hypothesis]:
+    """Sets without those that leave too much where one that holds them and more leaves little.
+
+    What is too much for a part to be named counts for the whole, although the likelihood, which takes what
+    a set leaves for error, may weigh both alike.
+    """
+    whole = [item for item in hypotheses if item.keys and left(item.fit) <= tuned.MOST_LEFT]
+
+    def is_part(item: Hypothesis) -> bool:
+        return left(item.fit) > tuned.MOST_LEFT and any(
+            item.keys < other.keys and beyond(other.fit) < beyond(item.fit) for other in whole
+        )
+
+    return [item for item in hypotheses if not item.keys or not is_part(item)]
 
 
 def _without(ranked: Sequence[Ranked], empty: Ranked) -> list[Ranked]:
