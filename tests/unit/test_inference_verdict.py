@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from spindle_fem.effects.framework.effect import Candidate
-from spindle_fem.effects.framework.spread import Spread
-from spindle_fem.effects.framework.term import TermParameter
-from spindle_fem.effects.framework.unrecorded import InIntervals, UnrecordedHeatTerm
 from spindle_fem.inference import tuned
-from spindle_fem.inference.belief import Belief, Coordinate
-from spindle_fem.inference.hypothesis import Hypothesis
-from spindle_fem.inference.hypothesis_fit import Fit
-from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
 from spindle_fem.inference.verdict import (
     NEAR_REASON,
@@ -23,60 +15,21 @@ from spindle_fem.inference.verdict import (
     any_magnitude,
     counted,
     detection_p_value,
-    judge,
     kind_of,
     rank,
     tempered,
     within_prior,
 )
-
-# Where a prior that is even in the logarithm has the density of the normal one.
-AS_NORMAL = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / tuned.SMALLEST_SIZE))
-HEAT = Coordinate("heat.front", 1.0, 0.2, True, -4.0, 4.0)
-DATA = 400
-
-
-def candidate(effect, component="front_bearings", kind="missing_physics", form="", factor=None):
-    factors = () if factor is None else (TermParameter(factor, 1.0, 0.6),)
-    size = factor or f"{effect}.size"
-    return Candidate(
-        effect, component, form, kind, size, 1.0, 1.2, factors=factors, shift_of_prior=bool(factor)
-    )
-
-
-def hypothesis(*candidates, misfit, evidence=None, log_prior=0.0, position=(), reduced=1.0):
-    """A fit with one coordinate for each candidate beside the machine's own."""
-    own = [
-        Coordinate(f"effect:{c.amplitude}" if c.factors else c.amplitude, 1.0, 0.6, True, -4.0, 4.0)
-        for c in candidates
-    ]
-    coordinates = (HEAT, *own)
-    where = np.full(len(coordinates), AS_NORMAL)
-    where[0] = 0.0
-    where[: len(position)] = position
-    fit = Fit(
-        tuple(candidates),
-        coordinates,
-        where,
-        np.eye(len(coordinates)),
-        -0.5 * misfit - 2.0 * len(candidates) if evidence is None else evidence,
-        reduced * DATA,
-        misfit,
-        np.zeros(DATA),
-        SlowError(),
-        Belief.prior((HEAT,)),
-    )
-    return Hypothesis(fit, log_prior)
-
-
-def verdict(*found, calibrated=False, trials=100, overlapping=None, **more):
-    return judge(list(found), trials=trials, calibrated=calibrated, overlapping=overlapping, **more)
-
-
-PRELOAD = candidate("thermal_preload")
-CHURNING = candidate("grease_churning")
-SCALE = candidate("heat_scale", kind="parameter", factor="heat.front")
-OFFSET = candidate("sensor_offset", "SP02", "sensor")
+from tests.support.made_hypotheses import (
+    AS_NORMAL,
+    CHURNING,
+    OFFSET,
+    PRELOAD,
+    SCALE,
+    candidate,
+    hypothesis,
+    verdict,
+)
 
 
 # ------------------------------------------------------------------------ ranking
@@ -242,27 +195,6 @@ def test_a_set_that_does_not_predict_what_was_held_out_is_not_named():
     assert verdict(*better, coarseness=2.0, **within).verdict == "missing_physics"
     # where readings leave far more than noise, nothing that is known explains it
     assert verdict(*same, left=lambda fit: 3.0).verdict == "unexplained"
-
-
-def test_events_of_a_network_are_named_where_laws_without_them_leave_too_much():
-    heat = "unrecorded_heat_source"
-    term = UnrecordedHeatTerm(heat, TermParameter("heat", 1.0, 1.2), Spread(()), InIntervals([(0.0, 100.0)]))
-    event = replace(candidate(heat, "oil"), terms=(term,))
-    null, law = hypothesis(misfit=2000.0), hypothesis(PRELOAD, misfit=900.0)
-    alone, both = hypothesis(event, misfit=500.0), hypothesis(PRELOAD, event, misfit=400.0)
-    little, much = 0.9 * tuned.MOST_LEFT, 1.1 * tuned.MOST_LEFT
-
-    def found(of_nothing, of_law, *sets, coarseness=2.0):
-        rest = {id(null.fit): of_nothing, id(law.fit): of_law}
-        left = {"left": lambda fit: rest.get(id(fit), 1.0), "beyond": lambda fit: 1.0}
-        return verdict(*sets, coarseness=coarseness, **left).chosen.fit.keys
-
-    assert found(much, much, null, alone) == alone.keys
-    assert found(little, much, null, alone) == null.keys
-    assert found(much, little, null, law, both) == law.keys
-    assert found(much, much, null, law, both) == both.keys
-    assert found(little, much, null, alone, coarseness=1.0) == alone.keys
-    assert found(little, much, replace(null, expected_misfit=3.0), alone) == alone.keys
 
 
 def test_what_nothing_could_do_by_chance_has_no_probability_left():

@@ -1,0 +1,50 @@
+"""What hypotheses about a written network amount to, which is a coarse picture of its machine."""
+
+from dataclasses import replace
+
+from spindle_fem.effects.framework.spread import Spread
+from spindle_fem.effects.framework.term import TermParameter
+from spindle_fem.effects.framework.unrecorded import InIntervals, UnrecordedHeatTerm
+from spindle_fem.inference import tuned
+from tests.support.made_hypotheses import OFFSET, PRELOAD, candidate, hypothesis, verdict
+
+
+def test_events_of_a_network_are_named_where_laws_without_them_leave_too_much():
+    heat = "unrecorded_heat_source"
+    term = UnrecordedHeatTerm(heat, TermParameter("heat", 1.0, 1.2), Spread(()), InIntervals([(0.0, 100.0)]))
+    event = replace(candidate(heat, "oil"), terms=(term,))
+    null, law = hypothesis(misfit=2000.0), hypothesis(PRELOAD, misfit=900.0)
+    alone, both = hypothesis(event, misfit=500.0), hypothesis(PRELOAD, event, misfit=400.0)
+    little, much = 0.9 * tuned.MOST_LEFT, 1.1 * tuned.MOST_LEFT
+
+    def found(of_nothing, of_law, *sets, coarseness=2.0):
+        rest = {id(null.fit): of_nothing, id(law.fit): of_law}
+        left = {"left": lambda fit: rest.get(id(fit), 1.0), "beyond": lambda fit: 1.0}
+        return verdict(*sets, coarseness=coarseness, **left).chosen.fit.keys
+
+    assert found(much, much, null, alone) == alone.keys
+    assert found(little, much, null, alone) == null.keys
+    assert found(much, little, null, law, both) == law.keys
+    assert found(much, much, null, law, both) == both.keys
+    assert found(little, much, null, alone, coarseness=1.0) == alone.keys
+    assert found(little, much, replace(null, expected_misfit=3.0), alone) == alone.keys
+
+
+def test_a_part_that_leaves_too_much_gives_way_to_the_whole_that_leaves_little():
+    null, part = hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=400.0)
+    whole = hypothesis(PRELOAD, OFFSET, misfit=399.0)
+    other = hypothesis(candidate("windage", "shaft"), OFFSET, misfit=399.0)
+
+    def found(of_part, later, *sets, coarseness=2.0):
+        rest = {id(null.fit): 9.0, id(part.fit): of_part * tuned.MOST_LEFT}
+        left = {
+            "left": lambda fit: rest.get(id(fit), 1.0),
+            "beyond": lambda fit: later if len(fit.keys) == 2 else 2.0,
+        }
+        return verdict(*sets, coarseness=coarseness, **left).chosen.fit.keys
+
+    assert found(1.1, 1.0, null, part, whole) == whole.keys
+    # It leaves little enough itself, the whole tells later readings no better, or does not hold it.
+    assert found(0.9, 1.0, null, part, whole) == part.keys
+    assert found(1.1, 2.5, null, part, whole) == part.keys
+    assert found(1.1, 1.0, null, part, other) == part.keys
