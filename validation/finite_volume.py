@@ -317,6 +317,15 @@ def _read(b: _Builder, readings: dict[str, NDArray[np.float64]]) -> None:
         vector = np.zeros(b.size)
         np.add.at(vector, b.index[chosen], volume[chosen])
         readings[f"mean:{name}"] = vector / vector.sum()
+    # Mean over sections, each as long as it is: what stretches a body along the axis.
+    for name, part, z0, z1 in m.STRETCHES:
+        between = (b.z_mid > z0) & (b.z_mid < z1)
+        chosen = (b.part == m.PARTS.index(part)) & between
+        section = np.where(chosen, volume, 0.0)
+        share = section / np.maximum(section.sum(axis=(0, 1)), 1e-30) * b.dz
+        vector = np.zeros(b.size)
+        np.add.at(vector, b.index[chosen], share[chosen])
+        readings[f"stretch:{name}"] = vector / vector.sum()
     for bearing in m.BEARINGS:
         (z0, z1, _, radius) = m._STANDING[f"{bearing}.outer"][0]
         vector = b.weights(b.boundary("r", radius * 1e-3, z0 * 1e-3, z1 * 1e-3, -1))
