@@ -46,7 +46,7 @@ PLACES = {"F": (0.057, 0.081, 0.125), "R": (0.441, 0.473)}
 SIDES = {"F": (1, 1, -1), "R": (1, -1)}
 NAMES = {"F": ["F1", "F2", "F3", "front_bearings"], "R": ["R1", "R2", "rear_bearings"]}
 SPACER = {"F": "mean:front_spacer.inner", "R": "mean:rear_spacer.inner"}
-SHAFT_EXPANSION, DENSITY = 12.0e-6, 7850.0
+SHAFT_EXPANSION, DENSITY = 12.5e-6, 7850.0
 # Segments of the shaft from the nose to F3 that a turning shaft shortens: length, bore, outside in m.
 TURNING = ((0.045, 0.030, 0.090), (0.080, 0.030, 0.070))
 # µm; of the displacement sensor.

@@ -68,7 +68,7 @@ def reduced(tmp_path_factory):
 def test_the_nose_moves_by_the_stretch_of_shaft_and_housing(reduced):
     path = Path(np.zeros(1), 30.0 * reduced.uniform[None], np.zeros((1, 6)))
     still, fast = (displacement(reduced, path, np.array([rpm]))[0] for rpm in (0.0, 3000.0))
-    assert still == pytest.approx(1e7 * (12.0e-6 * 0.125 - 10.5e-6 * 0.060), rel=1e-3)
+    assert still == pytest.approx(1e7 * (12.5e-6 * 0.125 - 10.5e-6 * 0.060), rel=1e-3)
     # A shaft of 180 and 140 mm shortens by half a micrometre at 3000 rpm.
     assert still - fast == pytest.approx(0.5, abs=0.15)
 
