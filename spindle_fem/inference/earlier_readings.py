@@ -8,7 +8,7 @@ forbid much. So the readings themselves are asked.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,8 @@ class EarlierReadings:
         in them count less.
     least : float
         Sum of squares at the fit.
+    straight : dict of str to (n,) ndarray
+        What directions in which the machine may differ do, as it counts, by their coordinate.
     """
 
     problem: Problem
@@ -55,6 +57,7 @@ class EarlierReadings:
     modes: Array
     share: Array
     least: float = 0.0
+    straight: dict[str, Array] = field(default_factory=dict)
 
     @classmethod
     def about(cls, problem: Problem, fit: Fit) -> EarlierReadings:
@@ -76,7 +79,8 @@ class EarlierReadings:
         kept = [i for i in range(len(fit.coordinates)) if i not in set(rows)]
         own = [fit.coordinates[i] for i in kept]
         residual, _ = found.residual(own, fit.position[kept])
-        return replace(found, least=float(residual @ residual))
+        straight = {name: found._counted(column) for name, column in problem.straight(()).items()}
+        return replace(found, least=float(residual @ residual), straight=straight)
 
     def residual(self, coordinates: Sequence[Coordinate], position: Array) -> tuple[Array, list[Prediction]]:
         """Whitened residuals (n,) of the calibration for coordinates of the machine, and its predictions."""
@@ -86,18 +90,17 @@ class EarlierReadings:
 
     def slopes(self, coordinates: Sequence[Coordinate], position: Array, near: list[Prediction]) -> Array:
         """Derivatives of :meth:`residual` by the coordinates, (n, p)."""
-        straight = self.problem.straight(())
         known = {c.name for c in self.problem.belief.coordinates}
         found = np.zeros((len(self.offset), len(coordinates)))
         bent = []
         for index, coordinate in enumerate(coordinates):
-            if coordinate.name in straight:
-                found[:, index] = coordinate.sigma * straight[coordinate.name]
+            if coordinate.name in self.straight:
+                found[:, index] = -coordinate.sigma * self.straight[coordinate.name]
             elif coordinate.name in known and not coordinate.name.startswith(OF_ONE_RECORDING):
                 bent.append(index)
         predicted = self._predicted(coordinates, position, bent, near)
-        found[:, bent] = self.problem.whitened([p.sensitivity for p in predicted])
-        return -self._counted(found)
+        found[:, bent] = -self._counted(self.problem.whitened([p.sensitivity for p in predicted]))
+        return found
 
     def _predicted(
         self,

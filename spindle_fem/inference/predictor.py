@@ -385,7 +385,9 @@ class Predictor:
         """Add first-order changes by events in gaps and deviations of the machine, in place."""
         known, slopes = self.directions_of(number)
         if known:
-            told.temperature[:] += slopes @ [values.get(name, 0.0) for name in known]
+            by = np.array([values.get(name, 0.0) for name in known])
+            # Of one matrix: there may be hundreds of directions.
+            told.temperature[:] += (slopes.reshape(-1, len(known)) @ by).reshape(told.temperature.shape)
             asked = [k for k, name in enumerate(known) if name in derivatives]
             places = [derivatives.index(known[k]) for k in asked]
             told.sensitivity[:, :, places] += slopes[:, :, asked]
