@@ -10,7 +10,6 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.registry import candidates_for, catalogue, interval_effects
 from spindle_fem.inference import tuned
@@ -94,10 +93,10 @@ class Diagnosis:
         """The chosen set as it is told: with hidden states from all readings, else as it was fitted."""
         return self.followed.fit if self.followed and self.followed.states else self.final
 
-    def state(self, candidate: Candidate) -> Told | None:
-        """Hidden state that a candidate of the chosen set is; None for others."""
-        chosen = any(c is candidate for c in (*self.final.candidates, *self.told.candidates))
-        return self.followed.states.get(candidate.amplitude) if chosen and self.followed else None
+    @property
+    def states(self) -> Mapping[str, Told]:
+        """Hidden states of the chosen set, by the name of their amplitude."""
+        return self.followed.states if self.followed else {}
 
     @property
     def machine_coordinates(self) -> tuple[Coordinate, ...]:

@@ -75,10 +75,11 @@ def reported_parameters(fit: Fit, candidate: Candidate, seed: int = 0) -> dict[s
 def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: float) -> dict[str, Any]:
     """One finding of a set; of the chosen one with states that all readings tell."""
     effect = effect_of(candidate.effect)
-    state = diagnosis.state(candidate)
+    state = None
     if fit is diagnosis.final:
-        candidate = diagnosis.told.candidates[fit.candidates.index(candidate)]
-        fit = diagnosis.told
+        state = diagnosis.states.get(candidate.amplitude)
+        fit, place = diagnosis.told, fit.candidates.index(candidate)
+        candidate = fit.candidates[place]
     parameters = reported_parameters(fit, candidate)
     reported = {name: Reported(item["value"], item["unit"]) for name, item in parameters.items()}
     values = candidate_values(candidate, fit.values)

@@ -316,7 +316,9 @@ def judge(
         and item.fit.candidates
         and item not in alike
     )
-    decided = evidence * (1.0 - nothing) >= tuned.DECIDED and not near
+    # What every likely set holds is sure, whether there is more or not.
+    common = sum(item.probability for item in ranked if _holds(item.fit, chosen.fit, known_as_one))
+    decided = common * (1.0 - nothing) >= tuned.DECIDED and not near
     if decided:
         reason = ""
     elif nothing > 1.0 - tuned.DECIDED:
@@ -448,8 +450,11 @@ def _without(ranked: Sequence[Ranked], empty: Ranked) -> list[Ranked]:
 
 def _alike(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
     """Whether two sets name the same effects at the same or overlapping places."""
-    if len(fit.candidates) != len(chosen.candidates):
-        return False
+    return len(fit.candidates) == len(chosen.candidates) and _holds(fit, chosen, overlapping)
+
+
+def _holds(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
+    """Whether a set names every effect of another at the same or an overlapping place."""
     left = [(c.effect, c.component) for c in chosen.candidates]
     for candidate in fit.candidates:
         match = next(
@@ -464,7 +469,6 @@ def _alike(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> 
             ),
             None,
         )
-        if match is None:
-            return False
-        left.remove(match)
-    return True
+        if match is not None:
+            left.remove(match)
+    return not left
