@@ -166,7 +166,7 @@ def draw_coupled(rng: np.random.Generator, model: ReducedSpindle, plan: Plan, bu
         NAMES[where],
         form["share"],
         law,
-        parameters={"outer_clearance": (clearance, "m")},
+        parameters={"outer_clearance": (1e6 * clearance, "um")},
         form=form | {"clearance_um": 1e6 * clearance},
     )
 

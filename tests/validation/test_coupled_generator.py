@@ -76,7 +76,7 @@ def test_the_nose_moves_by_the_stretch_of_shaft_and_housing(reduced):
 def test_a_case_can_be_read_and_says_what_it_conceals(reduced, tmp_path):
     answer = make_case(reduced, tmp_path, 91, 1, identify=False)
     assert [e["effect"] for e in answer["effects"]] == ["thermal_preload"]
-    assert 5e-6 <= answer["effects"][0]["parameters"]["outer_clearance"]["value"] <= 30e-6
+    assert 5.0 <= answer["effects"][0]["parameters"]["outer_clearance"]["value"] <= 30.0
     inputs = tmp_path / "inputs" / "case_0001"
     recording = read_recording(inputs)
     assert recording.displacement_names == ("S1",)
