@@ -80,6 +80,8 @@ class Material(SpecModel):
 
 # m; a unit was mistaken beyond it.
 _LARGEST_PART = 5.0
+# Least bore as a share of the outer diameter: a finer one takes millions of elements and carries no heat.
+_LEAST_BORE = 0.01
 
 
 class AnnulusSegment(SpecModel):
@@ -90,7 +92,7 @@ class AnnulusSegment(SpecModel):
     z: Range
     """Start and end along the axis; z = 0 is the spindle nose."""
     inner_diameter: Radius
-    """0 for a solid shaft."""
+    """0 for a solid shaft, else at least a hundredth of the outer one."""
     outer_diameter: UncertainLength
     """Larger than the inner one; with a `sigma` where it is an outside of a standing part."""
 
@@ -114,6 +116,18 @@ class AnnulusSegment(SpecModel):
                         f"{self.outer_diameter * 1e3:g} mm leaves no wall around "
                         f"inner_diameter {self.inner_diameter * 1e3:g} mm.",
                         f"Allowed: above {self.inner_diameter * 1e3:g} mm.",
+                    )
+                ]
+            )
+        least = _LEAST_BORE * self.outer_diameter
+        if 0.0 < self.inner_diameter < least:
+            raise_faults(
+                [
+                    Fault(
+                        "inner_diameter",
+                        f"{self.inner_diameter * 1e3:g} mm is no bore of a part of "
+                        f"{self.outer_diameter * 1e3:g} mm that can be meshed.",
+                        f"Allowed: 0 mm for a solid one, or {least * 1e3:g} mm and more.",
                     )
                 ]
             )

@@ -115,6 +115,10 @@ VALUES = {
         '"72 mm", outer_diameter = "80 mm"', '"80 mm", outer_diameter = "80 mm"', SpecError,
         "part.outer_spacer.segment.ring.outer_diameter", "80 mm leaves no wall", "above 80 mm",
     ),
+    "hair of a bore": (
+        '"72 mm", outer_diameter = "80 mm"', '"0.1 mm", outer_diameter = "80 mm"', SpecError,
+        "part.outer_spacer.segment.ring.inner_diameter", "0.1 mm is no bore", "0.8 mm and more",
+    ),
     "no length": ('z = ["92 mm", "104 mm"]', 'z = ["92 mm", "92 mm"]', SpecError, "part.housing.segment.shoulder.z", "92 mm to 92 mm", "beyond the start"),
     "turned range": (NOSE, NOSE.replace('["0 mm", "24 mm"]', '["24 mm", "0 mm"]'), SpecError, "part.shaft.segment.nose.z", "24 mm to 0 mm"),
     # priors
