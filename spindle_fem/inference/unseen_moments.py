@@ -36,13 +36,20 @@ def unseen_moments(predictor: Predictor, fit: Fit) -> dict[str, float]:
         held = stretches(~predictor.use[number], predictor.recordings[number].times)
         told = _Told(predictor, fit, fit.values | found, name)
         best = told.moment
-        for begin, end in held:
+        for begin, end in _beside(held, told.moment):
             inside = begin <= told.moment <= end
             if inside or told.cost_at(min(max(told.moment, begin), end)) < told.cost + FLAT:
                 best = min(best, told.best_within(begin, end), key=told.cost_at)
         if best != told.moment:
             found[name] = best
     return found
+
+
+def _beside(held: list[tuple[float, float]], moment: float) -> list[tuple[float, float]]:
+    """The stretch that a moment lies in, the last before it and the first after it."""
+    inside = [pair for pair in held if pair[0] <= moment <= pair[1]]
+    before = [pair for pair in held if pair[1] < moment]
+    return [*inside, *before[-1:], *[pair for pair in held if pair[0] > moment][:1]]
 
 
 def _moments(fit: Fit) -> Iterator[tuple[Candidate, str]]:
