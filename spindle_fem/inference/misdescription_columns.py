@@ -17,6 +17,7 @@ from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coolant_misdescriptions import coolant_misdescriptions
 from spindle_fem.inference.coordinate_names import NO_VALUES
 from spindle_fem.inference.gap_misdescriptions import gap_misdescriptions
+from spindle_fem.inference.growth_misdescriptions import growth_misdescriptions
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.mounting_misdescriptions import mounting_misdescriptions
@@ -32,6 +33,7 @@ PROVIDERS: tuple[Provider, ...] = (
     coolant_misdescriptions,
     structural_misdescriptions,
     mounting_misdescriptions,
+    growth_misdescriptions,
     network_misdescriptions,
     gap_misdescriptions,
 )

@@ -14,6 +14,7 @@ from spindle_fem.definition.machine_spec import DisplacementSensor
 from spindle_fem.effects.registry import candidates_for
 from spindle_fem.inference import tuned
 from spindle_fem.inference.calibration import calibrate
+from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.diagnosis import diagnose_recordings
 from spindle_fem.inference.findings import (
     channel_errors,
@@ -22,6 +23,7 @@ from spindle_fem.inference.findings import (
     predictions_at_stamps,
     rmse,
 )
+from spindle_fem.inference.growth_misdescriptions import growth_misdescriptions
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.opened_machine import DiagnosedMachine, with_growth
@@ -255,6 +257,18 @@ def test_displacements_are_told_apart_from_temperatures(heated):
     assert "response.S1" not in directions
     assert not any(".S1." in name for name in predictor.displacements())
     assert "S1" not in opened.view.channels
+
+
+def test_other_expansion_coefficients_move_displacements_alone(heated):
+    opened = heated[0]
+    assert not list(growth_misdescriptions(Predictor(opened.fast, opened.recordings)))
+    predictor = Predictor(opened.fast, with_growth(opened).recordings)
+    (direction,) = growth_misdescriptions(predictor)
+    base = BaseRun(predictor, 0, {}, ())
+    moved, told = direction.change(base).direct, base.told()
+    assert not moved[:, :2].any()
+    np.testing.assert_array_equal(moved[:, 2], told[:, 2] - told[0, 2])
+    assert np.ptp(moved[:, 2]) > 10.0
 
 
 def test_predictions_are_written_in_the_units_of_their_channels(heated, tmp_path):
