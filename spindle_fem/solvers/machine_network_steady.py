@@ -267,7 +267,8 @@ class _Operation:
             friction=self.friction,
             coolant=self.coolant,
         )
-        first = self.rounds == 0 and self.friction is not None
+        # only where another round follows may the first one end early
+        first = self.rounds == 0 and self.friction is not None and self._contacts_follow()
         self.temperature, _, used = newton(
             SparseBalance(self.network), self.temperature, enough=FIRST_ROUND if first else 0.0
         )
@@ -277,10 +278,14 @@ class _Operation:
 
     def settled(self, given: Array, found: Array) -> bool:
         """Whether the bearings have the temperatures that their contacts were taken at."""
-        if not any(group.ball_row.kind == "contact" for group in self.machine.spec.bearing_set):
+        if not self._contacts_follow():
             return True
         tolerance = TOLERANCE if self.friction is None else FOLLOWED_TOLERANCE
         return self.rounds > 1 and float(np.abs(found - given).max(initial=0.0)) < tolerance
+
+    def _contacts_follow(self) -> bool:
+        """Whether a ball row conducts through contacts that change with its temperatures."""
+        return any(group.ball_row.kind == "contact" for group in self.machine.spec.bearing_set)
 
 
 class _PreloadOperation(_Operation):

@@ -6,6 +6,11 @@ import numpy as np
 import pytest
 
 from scripts.random_machines import draw_machine, solve_machine
+from spindle_fem.commands.checked_machine import load_buildable
+from spindle_fem.model.lumped.machine_network import build_machine_network
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers.machine_network_steady import BALANCE_TOLERANCE, solve_machine_network
+from tests.support.valid_definition import VALID
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 5, 6, 7, 13, 14, 15, 16])
@@ -21,3 +26,13 @@ def test_by_elements(number, tmp_path):
     content = draw_machine(np.random.default_rng([4, number]))
     word, why = solve_machine(content, tmp_path / "machine.toml")
     assert word in ("solved", "refused", "unsettled"), why
+
+
+def test_network_whose_ball_rows_do_not_follow_temperature_balances(tmp_path):
+    """Its only round is solved to the end."""
+    file = tmp_path / "machine.toml"
+    file.write_text(VALID, encoding="utf-8")
+    spec = load_buildable(file, ())
+    assert all(group.ball_row.kind != "contact" for group in spec.bearing_set)
+    state = solve_machine_network(build_machine_network(spec), OperatingPoint.of(spec))
+    assert state.imbalance_relative < BALANCE_TOLERANCE
