@@ -57,6 +57,25 @@ class Coordinate:
         return float(np.clip(found, self.low, self.high))
 
 
+@dataclass(frozen=True, slots=True)
+class GivenUp:
+    """By how much earlier readings are told worse than where they are fitted best.
+
+    Attributes
+    ----------
+    misfit : float
+        In their sum of squared whitened residuals.
+    left : float
+        In the mean square of single residuals over their noise.
+    error : float
+        In the mean square of residuals of means over bins over what noise is left in those.
+    """
+
+    misfit: float = 0.0
+    left: float = 0.0
+    error: float = 0.0
+
+
 class Witness(Protocol):
     """Readings that speak of a machine's coordinates, wherever those are.
 
@@ -73,6 +92,9 @@ class Witness(Protocol):
 
     def slopes(self, coordinates: Sequence[Coordinate], position: Array, near: list[Prediction]) -> Array:
         """Derivatives of the residuals by the coordinates, (n, p); ``near`` are the predictions there."""
+
+    def given_up(self, coordinates: Sequence[Coordinate], position: Array) -> GivenUp:
+        """By how much they are told worse than where they are fitted best."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -296,11 +296,14 @@ def _refit(
         for distance, _, h in nearest[: tuned.NEAREST_REFITTED]
         if distance < tuned.NEAREST_WITHIN * tuned.NEAR_READINGS
     ]
-    # Sets far behind the first need not be fitted to their optimum.
+    # Sets far behind the first need not be fitted to their optimum, but for its parts: they are what is
+    # named where the rest of it is not needed.
     begun = problem.fit(first.candidates, first.values, iterations=0).misfit_with_prior
     behind = begun + 2.0 * tuned.HOPELESS_SCORE
     orders = [
-        FitOrder(h.fit.candidates, h.fit.values, iterations=12, hopeless=behind if h.keys else np.inf)
+        FitOrder(
+            h.fit.candidates, h.fit.values, iterations=12, hopeless=np.inf if h.keys < members else behind
+        )
         for h in chosen
     ]
     # A set that could be simulated on the search's basis may run away on the whole one, and is dropped then.

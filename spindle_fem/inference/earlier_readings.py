@@ -7,16 +7,17 @@ forbid much. So the readings themselves are asked.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.inference import tuned
-from spindle_fem.inference.belief import Coordinate
+from spindle_fem.inference.belief import Coordinate, GivenUp
 from spindle_fem.inference.coordinate_names import OF_ONE_RECORDING
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.input_sampling import error_over_noise, left_over_noise
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.robust_size import outlier_weight
 
@@ -46,6 +47,10 @@ class EarlierReadings:
         in them count less.
     least : float
         Sum of squares at the fit.
+    least_left : float
+        What single readings leave at the fit, as :func:`left_over_noise` has it.
+    least_error : float
+        What is left at the fit, as :func:`error_over_noise` has it.
     straight : dict of str to (n,) ndarray
         What directions in which the machine may differ do, as it counts, by their coordinate.
     """
@@ -57,6 +62,8 @@ class EarlierReadings:
     modes: Array
     share: Array
     least: float = 0.0
+    least_left: float = 0.0
+    least_error: float = 0.0
     straight: dict[str, Array] = field(default_factory=dict)
 
     @classmethod
@@ -78,15 +85,42 @@ class EarlierReadings:
         )
         kept = [i for i in range(len(fit.coordinates)) if i not in set(rows)]
         own = [fit.coordinates[i] for i in kept]
-        residual, _ = found.residual(own, fit.position[kept])
+        residual, predicted = found.residual(own, fit.position[kept])
         straight = {name: found._counted(column) for name, column in problem.straight(()).items()}
-        return replace(found, least=float(residual @ residual), straight=straight)
+        return replace(
+            found,
+            least=float(residual @ residual),
+            least_left=found._left(predicted, values),
+            least_error=found._error(predicted),
+            straight=straight,
+        )
 
     def residual(self, coordinates: Sequence[Coordinate], position: Array) -> tuple[Array, list[Prediction]]:
         """Whitened residuals (n,) of the calibration for coordinates of the machine, and its predictions."""
         predicted = self._predicted(coordinates, position, (), None)
         told = self.problem.whitened([p.temperature for p in predicted])
         return self._counted(self.problem.data - told + self.offset), predicted
+
+    def given_up(self, coordinates: Sequence[Coordinate], position: Array) -> GivenUp:
+        """By how much these readings are told worse than by their own fit."""
+        residual, predicted = self.residual(coordinates, position)
+        values = {c.name: c.at(u) for c, u in zip(coordinates, position, strict=True)}
+        return GivenUp(
+            max(0.0, float(residual @ residual) - self.least),
+            max(0.0, self._left(predicted, values) ** 2 - self.least_left**2),
+            max(0.0, self._error(predicted) - self.least_error),
+        )
+
+    def _left(self, predicted: list[Prediction], factors: Mapping[str, float]) -> float:
+        told = self._told(predicted)
+        return left_over_noise(self.problem.predictor, self.problem.observations, told, factors)
+
+    def _error(self, predicted: list[Prediction]) -> float:
+        return error_over_noise(self.problem.observations, self._told(predicted))
+
+    def _told(self, predicted: list[Prediction]) -> list[Array]:
+        seen = self.problem.observations
+        return [item.at(predicted[item.recording].temperature[:, item.channel]) for item in seen]
 
     def slopes(self, coordinates: Sequence[Coordinate], position: Array, near: list[Prediction]) -> Array:
         """Derivatives of :meth:`residual` by the coordinates, (n, p)."""

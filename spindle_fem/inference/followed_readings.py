@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.inference import tuned
+from spindle_fem.inference.belief import GivenUp
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
-from spindle_fem.inference.input_sampling import left_over_noise
+from spindle_fem.inference.input_sampling import error_over_noise, left_over_noise
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.reading_noise import ChannelBins, Whitener
 from spindle_fem.inference.robust_size import huber
@@ -61,6 +62,7 @@ class FollowedReadings:
         self._follow = follow
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
         self._followed: dict[int, tuple[Fit, Followed]] = {}
+        self._given: dict[int, tuple[Fit, GivenUp]] = {}
 
     def apart(self, one: Fit, other: Fit) -> float:
         """Root mean square of the difference over the noise, in the channel where it is largest."""
@@ -75,11 +77,11 @@ class FollowedReadings:
         return largest
 
     def left(self, fit: Fit) -> float:
-        """Root mean square residual of single readings over their noise, all channels weighted equally."""
-        plant = self._plant
-        return left_over_noise(
-            plant, plant.observations, self._told_by_all(fit, plant.observations), fit.values
-        )
+        """Root mean square residual of single readings over their noise, all channels weighted equally.
+
+        What a fit gives up of the calibration's readings is left of those.
+        """
+        return self._left_of(self._plant.observations, fit)
 
     def residuals(self, fit: Fit) -> list[tuple[ChannelBins, Array]]:
         """Predicted less read, K, averaged over the bins of every observation that was fitted."""
@@ -89,16 +91,22 @@ class FollowedReadings:
 
     def beyond(self, fit: Fit) -> float:
         """Residual of held-out readings likewise; switching states follow all readings."""
-        plant = self._plant
-        if not plant.heldout:
+        if not self._plant.heldout:
             return 0.0
-        return left_over_noise(plant, plant.heldout, self._told_by_all(fit, plant.heldout), fit.values)
+        return self._left_of(self._plant.heldout, fit)
+
+    def _left_of(self, seen: Sequence[Observation], fit: Fit) -> float:
+        left = left_over_noise(self._plant, seen, self._told_by_all(fit, seen), fit.values)
+        return float(np.sqrt(left**2 + self._given_up(fit).left))
 
     def heldout_misfit(self, fit: Fit) -> float | None:
-        """Minus twice the logarithm of their likelihood but for a constant, with the best set's error."""
+        """Minus twice the logarithm of their likelihood but for a constant, with the best set's error.
+
+        With that of the calibration's readings: a fit that gives them up to tell others predicts less.
+        """
         if not self._whiteners:
             return None
-        return sum(
+        return self._given_up(fit).misfit + sum(
             float(np.sum(huber(white(item.values - told))))
             for item, white, told in zip(
                 self._plant.heldout, self._whiteners, self._told_by_all(fit, self._plant.heldout), strict=True
@@ -148,14 +156,22 @@ class FollowedReadings:
         ]
 
     def _heldout_error(self, fit: Fit) -> float:
-        """Root mean square error of held-out readings over their noise."""
-        errors = [
-            np.mean((predicted - item.values) ** 2) / item.bins.white**2
-            for item, predicted in zip(
-                self._plant.heldout, self._told_by_all(fit, self._plant.heldout), strict=True
-            )
-        ]
-        return float(np.sqrt(np.mean(errors))) if errors else 0.0
+        """Root mean square error of held-out readings over their noise, with what is given up of others."""
+        held = self._plant.heldout
+        if not held:
+            return 0.0
+        error = error_over_noise(held, self._told_by_all(fit, held))
+        return float(np.sqrt(error + self._given_up(fit).error))
+
+    def _given_up(self, fit: Fit) -> GivenUp:
+        """What a fit gives up of the calibration's readings."""
+        known = self._final.belief
+        if known.earlier is None:
+            return GivenUp()
+        if id(fit) not in self._given:
+            own = fit.position[: len(known.coordinates)]
+            self._given[id(fit)] = fit, known.earlier.given_up(known.coordinates, own)
+        return self._given[id(fit)][1]
 
     def _of(self, fit: Fit) -> list[Array]:
         told = self._told(fit)

@@ -108,3 +108,18 @@ def left_over_noise(
         # Few readings far off, as about the edge of an interval, count as they do in a fit.
         ratios.append(np.mean(huber((values - item.values) / np.sqrt(noise))) + averaged / noise)
     return float(np.sqrt(np.mean(ratios)))
+
+
+def error_over_noise(observations: Sequence[Observation], told: Sequence[Array]) -> float:
+    """Mean square of residuals of means over bins over the white noise left in them, channels alike.
+
+    Parameters
+    ----------
+    told : sequence of (b,) ndarray, [K]
+        At the bins of every observation.
+    """
+    errors = [
+        np.mean((values - item.values) ** 2) / item.bins.white**2
+        for item, values in zip(observations, told, strict=True)
+    ]
+    return float(np.mean(errors))

@@ -21,7 +21,8 @@ class OutsideFilmTerm(Term):
 
     g is the law's growth, 1 at the reference difference; c is how much of it
     the nominal film already carries: all (1, the film is right at the
-    reference difference) to nothing (0, the law comes on top).
+    reference difference), more (right at a larger one) or nothing (0, the
+    law comes on top).
 
     Parameters
     ----------
@@ -79,16 +80,26 @@ class OutsideFilmEffect(Effect):
             places = {key: films for key, films in machine.films.items() if films}
         else:
             places = {"housing": machine.films["housing"]} if machine.films.get("housing") else {}
+        carried, starts = linear("carried_share", 0.5, 0.4, low=0.0, high=1.0), ({},)
+        if machine.kind == "network":
+            # A conductance between bodies is right at the differences that they had when it was found out,
+            # some kelvins to some tens of kelvins: which side of them a recording is on decides the sign.
+            carried = linear("carried_share", 1.0, 0.5, low=0.0, high=3.0)
+            starts = tuple({"carried_share": share} for share in (0.5, 1.0, 1.6))
         found = []
         for key, films in places.items():
-            parameters = (*self.free_parameters(), linear("carried_share", 0.5, 0.4, low=0.0, high=1.0))
+            parameters = (*self.free_parameters(), carried)
             walls, fluids = (
                 tuple(known[film] for film in films) for known in (machine.walls, machine.fluids)
             )
             term = self.term_kind(self.term_name(key), films, walls, fluids, parameters)
             found.append(
                 self.candidate(
-                    machine.component(key), term, amplitude=parameters[0].name, reference=parameters[0].sigma
+                    machine.component(key),
+                    term,
+                    amplitude=parameters[0].name,
+                    reference=parameters[0].sigma,
+                    starts=starts,
                 )
             )
         return tuple(found)
