@@ -67,6 +67,8 @@ def run_search(search: Search) -> list[Hypothesis]:
     if is_network:
         _levels_beside(search)
         _beside(search)
+        # What was found beside a law may explain all that the law did.
+        reduced(search)
     return search.ranked()
 
 

@@ -35,7 +35,7 @@ from spindle_fem.inference.prepared_problem import slow_error_of
 Array = NDArray[np.float64]
 
 # Rounds of segmentation and fit, and places that get them.
-ROUNDS, PLACES_SETTLED = 4, 2
+ROUNDS, PLACES_SETTLED = 4, 3
 # Gain of a round from which another one follows (natural logarithm).
 WORTH_ANOTHER = 2.0
 # Misfit beyond that of a course of levels from which one with a change less is not followed to its optimum.
@@ -90,9 +90,13 @@ def add_steps(search: Search, fit: Fit) -> None:
                 found.append((changes.gain, effect, onsets))
     found.sort(key=lambda item: -item[0])
     fair = [item for item in found if item[0] > tuned.FAIR_SHARE * found[0][0]]
-    # Heat and cooling are similar to first order: the second place is another effect's if there is one.
-    others = [item for item in fair if item[1] is not fair[0][1]]
-    for _, effect, onsets in [*fair[:1], *others, *fair[1:]][:PLACES_SETTLED]:
+    # Heat, heat in proportion to a source's and cooling are similar to first order: one place of each at first.
+    kinds: dict[tuple[str, bool], tuple[float, IntervalEffect, Onsets]] = {}
+    for item in fair:
+        kinds.setdefault((item[1].name, bool(item[2].pattern.source)), item)
+    first = list(kinds.values())
+    others = [item for item in fair if all(item is not chosen for chosen in first)]
+    for _, effect, onsets in [*first, *others][:PLACES_SETTLED]:
         _settle(search, fit, effect, onsets)
 
 
@@ -156,7 +160,7 @@ def _simplest(search: Search, problem: Problem, fit: Fit, place: StepPlace, foun
     A model that is not exact leaves a residual in proportion to the effect of the levels, which a further
     change may always fit a little.
     """
-    nothing = problem.fit(fit.candidates, fit.values, iterations=0).log_evidence
+    nothing = problem.fit(fit.candidates, fit.values).log_evidence
     least = tuned.LEAST_SHARE_OF_A_CHANGE * max(0.0, found.fit.log_evidence - nothing)
     spans = _over_lowest(*_course(*_spans(place.effect, found.fit), problem, place))
     if spans is None:
