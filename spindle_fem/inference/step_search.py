@@ -90,7 +90,7 @@ def add_steps(search: Search, fit: Fit) -> None:
                 found.append((changes.gain, effect, onsets))
     found.sort(key=lambda item: -item[0])
     fair = [item for item in found if item[0] > tuned.FAIR_SHARE * found[0][0]]
-    # Heat, heat in proportion to a source's and cooling are similar to first order: one place of each at first.
+    # Heat, heat in proportion to that of a source, and cooling are similar to first order: first one of each.
     kinds: dict[tuple[str, bool], tuple[float, IntervalEffect, Onsets]] = {}
     for item in fair:
         kinds.setdefault((item[1].name, bool(item[2].pattern.source)), item)
