@@ -17,7 +17,7 @@ from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.reading_noise import ChannelBins, Whitener
 from spindle_fem.inference.robust_size import huber
 from spindle_fem.inference.state_search import Told
-from spindle_fem.inference.unseen_moments import unseen_moments
+from spindle_fem.inference.unseen_moments import unread_changes, unseen_moments
 
 Array = NDArray[np.float64]
 
@@ -134,6 +134,7 @@ class FollowedReadings:
                 )
                 again = self._final.fit(own, fit.values, iterations=FOLLOWED_STEPS)
             moments = unseen_moments(self._plant, again)
+            moments |= unread_changes(self._plant if fit.candidates else self._unchanged, again)
             if moments:
                 moved = [
                     c.of(moments[c.name]) if c.name in moments else u

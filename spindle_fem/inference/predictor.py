@@ -217,6 +217,24 @@ class Predictor:
         """Pieces of the gaps of one recording in which something may have happened, [s]."""
         return self._gaps[number]
 
+    def unread_within(self, number: int, spans: Sequence[tuple[float, float]]) -> dict[str, Array]:
+        """What changed between rows, or in gaps, within stretches of time: its effect on the channels.
+
+        Returns
+        -------
+        dict of str to (G + 1, c) ndarray
+            K for each second that an input changed earlier, or for one of what may have happened.
+        """
+        grid = self.drives[number].grid
+        moments = {JUMP_PREFIX: [float(grid[step]) for step, _, _ in self._jumps[number]]}
+        moments[GAP_PREFIX] = [0.5 * (item.begin + item.end) for item in self._hidden[number]]
+        return {
+            f"{kind}{number}.{index}": self._slopes_of(kind, number)[:, :, index]
+            for kind, own in moments.items()
+            for index, moment in enumerate(own)
+            if any(begin <= moment <= end for begin, end in spans)
+        }
+
     def displacements(self) -> tuple[str, ...]:
         """Names of the displacements of every point probe that is read."""
         model = self.fast.model

@@ -79,15 +79,16 @@ def _direction(item: Misdescription) -> Coordinate:
     return Coordinate(item.coordinate, 0.0, item.sigma, False, -THETA_BOUND, THETA_BOUND, item.unit)
 
 
+def _jump(name: str, least: float, most: float) -> Coordinate:
+    """How much earlier an input changed than it is drawn [s]: anywhere from ``least`` to ``most`` alike."""
+    sigma = float(np.sqrt((most**3 - least**3) / (3.0 * (most - least))))
+    return Coordinate(name, 0.0, sigma, False, least / sigma, most / sigma, "s")
+
+
 def start_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:
     """Uncertain quantities of each recording: temperatures at its start, inputs within gaps, its clocks."""
     starts = [coordinate_of(prior, THETA_BOUND) for prior in predictor.starts()]
-    # Anywhere in the gap: a uniform distribution's mean, spread and ends.
-    ends = float(np.sqrt(3.0))
-    jumps = [
-        Coordinate(name, 0.5 * (least + most), (most - least) / np.sqrt(12.0), False, -ends, ends, "s")
-        for name, least, most in predictor.jumps()
-    ]
+    jumps = [_jump(name, least, most) for name, least, most in predictor.jumps()]
     gaps = [
         Coordinate(name, 0.0, tuned.GAP_SIGMA, False, -1.0 / tuned.GAP_SIGMA, 1.0 / tuned.GAP_SIGMA)
         for name in predictor.gaps()

@@ -27,6 +27,9 @@ GAP_STEPS = 1.5
 SHORTEST_GAP, LEAST_CHANGE = 120.0, 1.0
 # Length of a piece [s], and the most pieces of one gap: each is a further coordinate of every fit.
 GAP_PIECE, MOST_PIECES = 150.0, 8
+# A held input that is another in a row changed at any time since the row before it. Rows nearer than this [s]
+# leave nothing open that readings show, and of many changes the largest are left open.
+LEAST_SPACING, MOST_JUMPS, MOST_BETWEEN = 15.0, 60, 20
 # Input temperatures, by the name of their load.
 WARMTH = ("ambient", "coolant_inlet")
 
@@ -116,19 +119,36 @@ def hidden_in(
             before, after = recording.input_at(name, recording.times[row - 1 : row + 1])
             if abs(after - before) >= LEAST_CHANGE:
                 found.append(Hidden(begin, end, name, float(after - before)))
+        found += _between_rows(recording, name)
     return tuple(found)
 
 
+def _between_rows(recording: Recording, name: str) -> list[Hidden]:
+    """Where an input temperature changes much from row to row it need not have gone along a straight line."""
+    spacing = np.diff(recording.times)
+    change = np.diff(recording.input_at(name, recording.times))
+    near = (spacing >= LEAST_SPACING) & (spacing <= GAP_STEPS * np.median(spacing))
+    rows = np.flatnonzero(near & (np.abs(change) >= LEAST_CHANGE))
+    largest = np.sort(rows[np.argsort(-np.abs(change[rows]))[:MOST_BETWEEN]])
+    return [
+        Hidden(float(recording.times[row]), float(recording.times[row + 1]), name, float(change[row]))
+        for row in largest
+    ]
+
+
 def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, float], ...]:
-    """Changes of held inputs that fell into gaps, which :func:`coarse_drive` puts amid them.
+    """Changes of held inputs that fell into gaps, which :func:`coarse_drive` puts amid them, or between rows.
+
+    Inputs that are sampled are held until the next sample: a change between two rows shows in the second.
 
     Returns
     -------
     tuple of (int, float, float)
         Step at whose start each is put; how much earlier [s], least and most,
-        it may have been.
+        it may have been: in a gap up to half of it either way.
     """
     usual = float(np.median(np.diff(recording.times)))
+    largest = np.ptp(drive.start, axis=0)
     found = []
     for step in 1 + np.flatnonzero(np.any(drive.start[1:] != drive.end[:-1], axis=1)):
         time = drive.grid[step]
@@ -136,9 +156,13 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
         if not 0 < row < recording.times.size:
             continue
         first, last = recording.times[row - 1], recording.times[row]
-        if last - first > GAP_STEPS * usual:
-            found.append((int(step), float(time - last), float(time - first)))
-    return tuple(found)
+        in_gap = last - first > GAP_STEPS * usual
+        if in_gap or last - first >= LEAST_SPACING:
+            change = np.abs(drive.start[step] - drive.end[step - 1]) / np.maximum(largest, 1e-9)
+            size = np.inf if in_gap else float(change.max())
+            found.append((size, (int(step), float(time - last), float(time - first))))
+    chosen = sorted(found, key=lambda item: -item[0])[:MOST_JUMPS]
+    return tuple(sorted(item for _, item in chosen))
 
 
 def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, float, float]]) -> Array:

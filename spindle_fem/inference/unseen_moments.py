@@ -1,4 +1,4 @@
-"""Moments of changes that fell into held-out stretches, from all readings.
+"""Moments of changes, of a set's and of inputs, that fell into held-out stretches, from all readings.
 
 No fitted reading shows when within such a stretch something changed. What a set predicts there is judged by
 its sizes and laws, not by the guess of a moment that only the held-out readings themselves can tell.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import lsq_linear, minimize_scalar
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit
@@ -42,6 +42,38 @@ def unseen_moments(predictor: Predictor, fit: Fit) -> dict[str, float]:
                 best = min(best, told.best_within(begin, end), key=told.cost_at)
         if best != told.moment:
             found[name] = best
+    return found
+
+
+def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
+    """What inputs did between the rows of held-out stretches, from all readings: values by name.
+
+    To first order, and within the bounds of what rows leave open.
+    """
+    known = {c.name: (c, u) for c, u in zip(fit.coordinates, fit.position, strict=True)}
+    found: dict[str, float] = {}
+    for number, recording in enumerate(predictor.recordings):
+        held = stretches(~predictor.use[number], recording.times)
+        slopes = {n: s for n, s in predictor.unread_within(number, held).items() if n in known}
+        if not slopes:
+            continue
+        told = predictor.predict(number, fit.values, fit.candidates).temperature
+        matrix, rest = [], []
+        for item in (*predictor.observations, *predictor.heldout):
+            if item.recording == number:
+                noise = np.hypot(item.bins.white, fit.slow.sigma)
+                own = np.column_stack([slope[:, item.channel] for slope in slopes.values()])
+                matrix.append(item.at(own) / noise)
+                rest.append((item.values - item.at(told[:, item.channel])) / noise)
+        coordinates = [known[name][0] for name in slopes]
+        now = np.array([known[name][1] for name in slopes])
+        columns = np.vstack(matrix) * np.array([c.sigma for c in coordinates])
+        moved = lsq_linear(
+            np.vstack((columns, np.eye(len(now)))),
+            np.concatenate((*rest, np.zeros(len(now)))) + np.concatenate((columns @ now, np.zeros(len(now)))),
+            ([c.low for c in coordinates], [c.high for c in coordinates]),
+        ).x
+        found |= {c.name: c.at(u) for c, u in zip(coordinates, moved, strict=True)}
     return found
 
 
