@@ -8,6 +8,7 @@ import pytest
 
 from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.inference.coordinate_names import START_PREFIX
+from spindle_fem.inference.followed_readings import FollowedReadings
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate
@@ -131,4 +132,21 @@ def test_what_changed_since_the_calibration_is_not_taken_up_by_the_machine(calib
 
     assert (
         nothing_missing(found.known).misfit_with_prior > 5.0 * nothing_missing(found.belief).misfit_with_prior
+    )
+
+
+def test_what_a_fit_gives_up_of_a_calibration_counts_beside_what_it_leaves(calibrated):
+    """Nothing missing tells later readings at the calibration's expense; the changed links give up nothing."""
+    found, predictor = calibrated
+    known = found.known
+    at_fit = known.earlier.given_up(known.coordinates, known.start)
+    assert max(at_fit.misfit, at_fit.left, at_fit.error) < 1e-6
+    final = Problem(predictor, known, found.slow, predictor.observations)
+    readings = FollowedReadings(final, final)
+    drifted = Problem(predictor, found.belief, found.slow, predictor.observations).fit()
+    given = known.earlier.given_up(known.coordinates, drifted.position)
+    assert min(given.misfit, given.left, given.error) > 1.0
+    alone = Problem(predictor, found.belief, found.slow, predictor.observations)
+    assert readings.left(drifted) ** 2 == pytest.approx(
+        FollowedReadings(alone, alone).left(drifted) ** 2 + given.left
     )

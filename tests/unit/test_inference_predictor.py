@@ -5,14 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.interpolate import interp1d
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.registry import candidates_for, effect_of, interval_effects
 from spindle_fem.inference.candidate_response import BaseRun, Variant, variants_of
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, PROBE_PREFIX
 from spindle_fem.inference.drive_steps import coarse_drive
+from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, known_before, start_coordinates
+from spindle_fem.inference.recording_gaps import hidden_in
 from spindle_fem.inference.search_basis import on_search_basis
+from spindle_fem.inference.unseen_moments import unread_changes
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.drive import drive_of_recording
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
@@ -315,6 +320,62 @@ def test_what_happens_in_a_gap_is_open_for_each_set_and_for_inputs_that_changed(
     # The first set warms its own end; coolant that is warmer all the time warms everything.
     assert change[first][after, front] > change[first][after, rear] >= 0.0
     assert (change[last][after:] > 0.0).all()
+
+
+def test_when_a_held_input_changed_between_two_rows_is_open(predictor, recording):
+    """A sample shows what changed since the one before it: up to a spacing earlier, never later."""
+    own = predictor.jumps()
+    assert [(least, most) for _, least, most in own] == [(0.0, 50.0)] * 3
+    jump = start_coordinates(predictor)[-3:][1]
+    assert (jump.at(jump.low), jump.at(jump.high)) == (0.0, pytest.approx(50.0))
+    assert jump.at(0.0) == 0.0
+    # The second, the stop at 2500 s, 40 s earlier: the same run with rows ten seconds apart.
+    times = np.union1d(recording.times, [2460.0])
+    rows = np.searchsorted(recording.times, times, side="right") - 1
+    inputs = recording.inputs[rows].copy()
+    inputs[times == 2460.0, recording.input_names.index("speed")] = 0.0
+    earlier = replace(
+        recording,
+        times=times,
+        temperature=recording.temperature[rows],
+        flags=recording.flags[rows],
+        inputs=inputs,
+        covariates=recording.covariates[rows],
+    )
+    exact = Predictor(predictor.fast, [earlier], [np.ones(times.size, dtype=bool)], step=60.0)
+    after = 3100.0
+    told, meant = (
+        interp1d(item.drives[0].grid, item.predict(0, values).temperature, axis=0)(after)
+        for item, values in ((predictor, {own[1][0]: 40.0}), (exact, {}))
+    )
+    still = interp1d(predictor.drives[0].grid, predictor.predict(0, {}).temperature, axis=0)(after)
+    fast = [PROBES.index(name) for name in ("SP01", "SP02", "SP03")]
+    assert np.abs(meant - still)[fast].min() > 0.01
+    np.testing.assert_allclose((told - still)[fast], (meant - still)[fast], rtol=0.15)
+
+
+def test_an_input_temperature_need_not_go_straight_between_rows_far_apart(recording):
+    column = recording.input_names.index("coolant_inlet")
+    inputs = recording.inputs.copy()
+    inputs[recording.times > 2000.0, column] += 9.0
+    (found,) = hidden_in(replace(recording, inputs=inputs), (), ())
+    assert (found.begin, found.end, found.what) == (2000.0, 2050.0, "coolant_inlet")
+    assert found.size == pytest.approx(9.0, abs=0.1)
+    assert hidden_in(recording, (), ()) == ()
+
+
+def test_changes_between_rows_that_were_held_out_are_told_by_all_readings(predictor, recording):
+    """No fitted reading shows when within a held-out stretch something changed: its own readings do."""
+    use = (recording.times < 2400.0) | (recording.times > 2900.0)
+    blank = Predictor(predictor.fast, [recording], [use], step=60.0)
+    name = blank.jumps()[1][0]
+    truth = blank.predict(0, {name: 35.0}).temperature
+    at_rows = interp1d(blank.drives[0].grid, truth, axis=0)(recording.times)
+    own = Predictor(predictor.fast, [replace(recording, temperature=at_rows)], [use], step=60.0)
+    fit = Problem(own, known_before(own), EXPECTED_SLOW, own.observations).fit()
+    # What comes after the stretch tells less than what is in it.
+    missed, told = abs(fit.values[name] - 35.0), abs(unread_changes(own, fit)[name] - 35.0)
+    assert told < 2.5 < 6.0 < missed
 
 
 def test_the_small_basis_reads_what_the_large_one_does(predictor, candidates):
