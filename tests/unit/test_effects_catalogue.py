@@ -456,3 +456,18 @@ def test_a_network_is_seen_by_its_nodes_links_and_sources(machines):
     }
     assert view.component("winding.power") == "winding"
     assert view.typical_heat == pytest.approx(0.8 * 120.0 + 15.0 * 1.5)
+
+
+def test_a_conductance_of_a_network_may_be_right_at_larger_differences(machines):
+    """Below them it is less than its nominal value: a film calibrated at 30 K and used at 5 K."""
+
+    def offered(kind):
+        return [c for c in candidates_for(machines[kind][2]) if c.effect == "natural_convection"]
+
+    by_name = {p.name: p for c in offered("network") for p in c.parameters.values()}
+    assert by_name["carried_share"].high > 3.0**0.5 > 1.0
+    for candidate in offered("network"):
+        starts = [value for start in candidate.starts for value in start.values()]
+        assert min(starts) < 1.0 < max(starts)
+    (housing,) = offered("geometry")
+    assert next(p for p in housing.parameters.values() if p.name == "carried_share").high == 1.0

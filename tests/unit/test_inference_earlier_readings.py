@@ -136,7 +136,7 @@ def test_what_changed_since_the_calibration_is_not_taken_up_by_the_machine(calib
 
 
 def test_what_a_fit_gives_up_of_a_calibration_counts_beside_what_it_leaves(calibrated):
-    """Nothing missing tells later readings at the calibration's expense; the changed links give up nothing."""
+    """Nothing missing tells later readings at the calibration's expense."""
     found, predictor = calibrated
     known = found.known
     at_fit = known.earlier.given_up(known.coordinates, known.start)

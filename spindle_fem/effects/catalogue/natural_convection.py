@@ -44,7 +44,7 @@ class NaturalConvection(OutsideFilmEffect):
     card = Card(
         group="Surroundings",
         law="film × (1 + a g)/(1 + a c), g = (ΔT/10 K)^m",
-        size="a ± 0.7; m 0.3 ± 0.08; c 0.5 ± 0.4",
+        size="a ± 0.7; m 0.3 ± 0.08; c 0.5 ± 0.4, of a network 1 ± 0.5",
         acts_on="standing outside, boundary links",
         source="Churchill & Chu (1975), Int. J. Heat Mass Transfer 18, 1049, 1323",
     )

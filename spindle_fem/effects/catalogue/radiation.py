@@ -50,7 +50,7 @@ class Radiation(OutsideFilmEffect):
     card = Card(
         group="Surroundings",
         law="the same with g = (T⁴ - T_air⁴)/(T - T_air) over its value at 303 and 293 K",
-        size="a ± 0.6; c 0.5 ± 0.4",
+        size="a ± 0.6; c 0.5 ± 0.4, of a network 1 ± 0.5",
         acts_on="standing outside, boundary links",
         source="Stefan-Boltzmann",
     )
