@@ -173,6 +173,7 @@ class Departure:
         known = self.belief
         if known.earlier is None:
             return known
-        q, root = np.linalg.qr(slopes)
-        mean = self.position - np.linalg.solve(root, q.T @ self.residual)
-        return Belief(known.coordinates, mean, root)
+        # The prior among the residuals keeps the normal equations well conditioned.
+        precision = slopes.T @ slopes
+        mean = self.position - np.linalg.solve(precision, slopes.T @ self.residual)
+        return Belief(known.coordinates, mean, np.linalg.cholesky(precision).T)

@@ -51,6 +51,12 @@ class EarlierReadings:
         What single readings leave at the fit, as :func:`left_over_noise` has it.
     least_error : float
         What is left at the fit, as :func:`error_over_noise` has it.
+    columns : tuple of (b, k) ndarray
+        What each quantity of one recording does to the means over bins of every observation, [K].
+    fitted : (k,) ndarray
+        Coordinates of those quantities at the fit.
+    settled : (k, n) ndarray
+        Their best coordinates by the whitened residuals about zero.
     straight : dict of str to (n,) ndarray
         What directions in which the machine may differ do, as it counts, by their coordinate.
     """
@@ -64,6 +70,9 @@ class EarlierReadings:
     least: float = 0.0
     least_left: float = 0.0
     least_error: float = 0.0
+    columns: tuple[Array, ...] = ()
+    fitted: Array = field(default_factory=lambda: np.zeros(0))
+    settled: Array = field(default_factory=lambda: np.zeros((0, 0)))
     straight: dict[str, Array] = field(default_factory=dict)
 
     @classmethod
@@ -73,7 +82,7 @@ class EarlierReadings:
         rows = [i for i, c in enumerate(fit.coordinates) if c.name.startswith(OF_ONE_RECORDING)]
         predicted = problem.predict((), fit.coordinates, fit.position, by=rows)
         columns = problem.whitened([p.sensitivity for p in predicted])
-        modes, size, _ = np.linalg.svd(weight[:, None] * columns, full_matrices=False)
+        modes, size, turned = np.linalg.svd(weight[:, None] * columns, full_matrices=False)
         values = fit.values
         found = cls(
             problem,
@@ -82,16 +91,23 @@ class EarlierReadings:
             weight,
             modes,
             1.0 - 1.0 / np.hypot(1.0, size),
+            columns=tuple(
+                item.at(predicted[item.recording].sensitivity[:, item.channel])
+                for item in problem.observations
+            ),
+            fitted=fit.position[rows],
+            settled=turned.T @ ((size / (1.0 + size**2))[:, None] * modes.T) * weight,
         )
         kept = [i for i in range(len(fit.coordinates)) if i not in set(rows)]
         own = [fit.coordinates[i] for i in kept]
         residual, predicted = found.residual(own, fit.position[kept])
         straight = {name: found._counted(column) for name, column in problem.straight(()).items()}
+        left, error = found._left(predicted, values)
         return replace(
             found,
             least=float(residual @ residual),
-            least_left=found._left(predicted, values),
-            least_error=found._error(predicted),
+            least_left=left,
+            least_error=error,
             straight=straight,
         )
 
@@ -105,22 +121,23 @@ class EarlierReadings:
         """By how much these readings are told worse than by their own fit."""
         residual, predicted = self.residual(coordinates, position)
         values = {c.name: c.at(u) for c, u in zip(coordinates, position, strict=True)}
+        left, error = self._left(predicted, values)
         return GivenUp(
             max(0.0, float(residual @ residual) - self.least),
-            max(0.0, self._left(predicted, values) ** 2 - self.least_left**2),
-            max(0.0, self._error(predicted) - self.least_error),
+            max(0.0, left**2 - self.least_left**2),
+            max(0.0, error - self.least_error),
         )
 
-    def _left(self, predicted: list[Prediction], factors: Mapping[str, float]) -> float:
-        told = self._told(predicted)
-        return left_over_noise(self.problem.predictor, self.problem.observations, told, factors)
-
-    def _error(self, predicted: list[Prediction]) -> float:
-        return error_over_noise(self.problem.observations, self._told(predicted))
-
-    def _told(self, predicted: list[Prediction]) -> list[Array]:
+    def _left(self, predicted: list[Prediction], factors: Mapping[str, float]) -> tuple[float, float]:
+        """What single readings and means over bins leave where what belongs to one recording follows."""
         seen = self.problem.observations
-        return [item.at(predicted[item.recording].temperature[:, item.channel]) for item in seen]
+        rest = self.problem.data - self.problem.whitened([p.temperature for p in predicted])
+        moved = self.settled @ (rest + self.offset) - self.fitted
+        told = [
+            item.at(predicted[item.recording].temperature[:, item.channel]) + own @ moved
+            for item, own in zip(seen, self.columns, strict=True)
+        ]
+        return left_over_noise(self.problem.predictor, seen, told, factors), error_over_noise(seen, told)
 
     def slopes(self, coordinates: Sequence[Coordinate], position: Array, near: list[Prediction]) -> Array:
         """Derivatives of :meth:`residual` by the coordinates, (n, p)."""

@@ -350,7 +350,8 @@ class _Slopes:
 
     def curvature(self, point: _Point) -> Array:
         """Half the second derivatives of the cost, to first order of the readings, (p, p)."""
-        found = self.jacobian.T @ (outlier_weight(point.residual)[:, None] * self.jacobian)
+        rooted = np.sqrt(outlier_weight(point.residual))[:, None] * self.jacobian
+        found = rooted.T @ rooted
         machine = self.pulled.shape[1]
         found[:machine, :machine] += self.pulled.T @ self.pulled
         rest = range(machine, len(found))

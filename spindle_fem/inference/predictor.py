@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -266,22 +267,13 @@ class Predictor:
             return self.drives[number].first("ambient")
         return float(np.mean(list(self.recordings[number].first_readings().values())))
 
-    def _run_name(self, number: int, name: str, outside: Sequence[str]) -> str | None:
-        """Name of a coordinate in the run of one recording; None if it does not enter."""
-        if name in outside or name.startswith(FIRST_ORDER):
-            return None
-        if name.startswith(START_PREFIX):
-            owner, _, own = name.removeprefix(START_PREFIX).partition(".")
-            return own if int(owner) == number else None
-        return name.removeprefix(EFFECT_PREFIX)
-
     def _factors(
         self, number: int, values: Mapping[str, float], known: Sequence[str], readings: Sequence[str]
     ) -> dict[str, float]:
         """Factors of the machine's parameters in the run of one recording."""
         factors: dict[str, float] = dict(self.effects.factors)
         for name, value in values.items():
-            own = None if name in known else self._run_name(number, name, readings)
+            own = None if name in known or name in readings else _run_name(number, name)
             if own is not None:
                 factors[own] = factors.get(own, 1.0) * value
         return factors
@@ -357,7 +349,7 @@ class Predictor:
         shared = {name for c in acting for term in c.terms for name in term.names()}
         of_readings = {f"{r.name}.{item.name}" for r in _readings(acting) for item in r.parameters}
         outside = (of_readings - shared) | idle
-        inner = [self._run_name(number, name, outside) for name in derivatives]
+        inner = [None if name in outside else _run_name(number, name) for name in derivatives]
         of_run = tuple(dict.fromkeys(own for own in inner if own is not None))
         initial = self.start(number, values, of_run)
         if self.at_stamps:
@@ -409,7 +401,9 @@ class Predictor:
             asked = [k for k, name in enumerate(known) if name in derivatives]
             places = [derivatives.index(known[k]) for k in asked]
             told.sensitivity[:, :, places] += slopes[:, :, asked]
-        for kind in (JUMP_PREFIX, GAP_PREFIX):
+        for kind, open_ones in ((JUMP_PREFIX, self._jumps[number]), (GAP_PREFIX, self._hidden[number])):
+            if not open_ones:
+                continue
             prefix = f"{kind}{number}."
             for name in {name for name in (*values, *derivatives) if name.startswith(prefix)}:
                 slope = self._slopes_of(kind, number)[:, :, int(name.removeprefix(prefix))]
@@ -477,6 +471,17 @@ class Predictor:
 
 def _readings(candidates: Sequence[Candidate]) -> list[Reading]:
     return [c.reading for c in candidates if c.reading is not None]
+
+
+@lru_cache(maxsize=65536)
+def _run_name(number: int, name: str) -> str | None:
+    """Name of a coordinate in the run of one recording; None if it does not enter."""
+    if name.startswith(FIRST_ORDER):
+        return None
+    if name.startswith(START_PREFIX):
+        owner, _, own = name.removeprefix(START_PREFIX).partition(".")
+        return own if int(owner) == number else None
+    return name.removeprefix(EFFECT_PREFIX)
 
 
 def _acting(candidates: Sequence[Candidate], number: int) -> tuple[tuple[Candidate, ...], set[str]]:
