@@ -85,7 +85,7 @@ class OutsideFilmEffect(Effect):
             # A conductance between bodies is right at the differences that they had when it was found out,
             # some kelvins to some tens of kelvins: which side of them a recording is on decides the sign.
             carried = linear("carried_share", 1.0, 0.5, low=0.0, high=3.0)
-            starts = tuple({"carried_share": share} for share in (0.5, 1.0, 1.6))
+            starts = tuple({"carried_share": share} for share in (1.0, 1.6))
         found = []
         for key, films in places.items():
             parameters = (*self.free_parameters(), carried)
