@@ -10,7 +10,7 @@ RESULT ?= runs/wu_tan_2016
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test setup lint lowest docs wheel-check first-hour reference study book proof hardening clean
+.PHONY: run test setup lint lowest docs wheel-check first-hour browser reference study book proof hardening clean
 
 run: $(READY)
 	$(BIN)/spindle-fem run -o $(RESULT)
@@ -43,6 +43,11 @@ wheel-check: $(READY)
 # README's first hour from the wheel and its dependencies alone, in an empty environment.
 first-hour: $(READY)
 	bash scripts/first_hour.sh $(BIN)/python
+
+# The interactive page in the Chromium of this machine, a picture of every view in build/views.
+browser: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
+	VIEW_PICTURES=build/views $(BIN)/python -m pytest -q -n 0 -m slow tests/cli/test_view_browser.py
 
 # The lowest versions that pyproject.toml allows, in an environment of their own, and a sample of the tests on them.
 lowest: $(READY)

@@ -161,6 +161,7 @@ FAULTS = [
     ({"bearing": {"preload": '"5 N"'}}, SpecError, "bearing.preload", "Preload needs a counter bearing"),
     ({"bearing": {"groove_curvature_inner": "0.5"}}, SpecError, "groove_curvature_inner", "above 0.5"),
     ({"operation": {"speed": '"-10 rpm"'}}, SpecError, "operation.speed", "speed is -10 rpm"),
+    ({"operation": {"speed": '"1e9 rpm"'}}, SpecError, "operation.speed", "runs above 39917 rpm"),
     (
         {"operation": {"axial_load": '"-10 N"'}},
         SpecError,

@@ -135,6 +135,15 @@ def test_faults_of_a_roller_bearing_file_all_at_once(tmp_path: Path) -> None:
     assert all(key in str(caught.value) for key in ("bearing.rows", "bearing.pitch_diameter", "axial_load"))
 
 
+def test_no_roller_bearing_turns_as_fast(tmp_path: Path) -> None:
+    file = tmp_path / "rollers.toml"
+    file.write_text(
+        '[bearing]\ncatalogue = "NN3014 K"\n[operation]\nspeed = "1e6 rpm"\nradial_load = "1 kN"\n'
+    )
+    with pytest.raises(SpecError, match=r"operation\.speed: .*1e\+06 rpm.* runs above"):
+        spindle_fem.bearing(file)
+
+
 def test_terminal_shows_every_roller_and_what_is_missing(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     file = tmp_path / "rollers.toml"

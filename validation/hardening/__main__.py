@@ -25,7 +25,7 @@ from .page import page, summarise
 
 CASES = "cases.jsonl"
 # A sample: cases whose commands need nothing but the case.
-SHORT = {"definitions": 12, "recordings": 7, "studies": 4}
+SHORT = {"definitions": 12, "circuits": 3, "recordings": 7, "studies": 4, "bearings": 3}
 
 
 def read_cases(place: Path) -> list[dict[str, Any]]:

@@ -24,21 +24,38 @@ OVERRIDDEN = (*OVERRIDDEN, "mesh.preset", "heat.model", "channel.turns", "part.0
 @cache
 def sources() -> dict[str, dict[str, Any]]:
     """Tables of every definition that is at hand, by name; those with a base as they are written."""
-    files = [*sorted((ROOT / "geometry").glob("*.toml")), ROOT / "examples" / "pump.toml"]
+    return _tables_of([*sorted((ROOT / "geometry").glob("*.toml")), ROOT / "examples" / "pump.toml"])
+
+
+@cache
+def circuit_sources() -> dict[str, dict[str, Any]]:
+    """Tables of machines with circuits, streams, oil and unlike bearings beside what ships."""
+    return _tables_of(sorted(Path(__file__).with_name("machines").glob("*.toml")))
+
+
+def _tables_of(files: list[Path]) -> dict[str, dict[str, Any]]:
     return {path.stem: tomllib.loads(path.read_text(encoding="utf-8")) for path in files}
 
 
 def try_definition(number: int, chance: random.Random, folder: Path) -> Record:
     """Check one spoilt definition; solve it where it is accepted."""
-    record = Record("definitions", number)
-    name = chance.choice(sorted(sources()))
-    content, record.done = mutated(chance, sources()[name])
+    return _try(Record("definitions", number), sources(), chance, folder)
+
+
+def try_circuit(number: int, chance: random.Random, folder: Path) -> Record:
+    """The same of a machine with circuits, streams, oil or unlike bearings."""
+    return _try(Record("circuits", number), circuit_sources(), chance, folder)
+
+
+def _try(record: Record, tables: dict[str, dict[str, Any]], chance: random.Random, folder: Path) -> Record:
+    name = chance.choice(sorted(tables))
+    content, record.done = mutated(chance, tables[name])
     record.done.insert(0, name)
     file = folder / "machine.toml"
     file.write_bytes(content)
     given = ["--set", _override(chance)] if chance.random() < SHARE_OVERRIDES else []
     record.done += given
-    run = run_process if number % EVERY_PROCESS == 0 else run_command
+    run = run_process if record.number % EVERY_PROCESS == 0 else run_command
     if record.step("check", run(["check", file.name, *given], folder)) == ACCEPTED:
         _run_accepted(record, file, given, folder)
     return record

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from . import texts
-from .definitions import try_definition
+from .definitions import try_circuit, try_definition
 from .folders import try_folder
 from .judged import FAULT, Record
 from .kills import KILLS, try_kill
 from .recordings import try_recording
-from .studies import try_study
+from .studies import try_bearing, try_study
 from .surroundings import TRIALS, try_surroundings
 from .texts import try_text
 
@@ -23,6 +23,8 @@ FAMILIES = {
     "definitions": (try_definition, 2000),
     "recordings": (try_recording, 1000),
     "studies": (try_study, 300),
+    "circuits": (try_circuit, 300),
+    "bearings": (try_bearing, 300),
     "folders": (try_folder, 200),
     "texts": (try_text, texts.count()),
     "kills": (try_kill, sum(KILLS.values())),

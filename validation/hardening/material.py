@@ -147,6 +147,75 @@ speed = "3000 rpm"
 radial_load = "2 kN"
 """
 
+# What those above have not: a groove that leans by its clearance, a cage that a ring guides, seals, fits and
+# temperatures that change the clearance, types from the catalogue.
+LUBRICANT = """
+[lubricant]
+kinematic_viscosity_40 = "22 mm**2/s"
+kinematic_viscosity_100 = "5 mm**2/s"
+"""
+BEARINGS = {
+    "deep_groove": """
+[bearing]
+catalogue = "6208"
+radial_clearance = "10 um"
+seal_moment = "0.03 N*m"
+arrangement = "back_to_back"
+preload = "150 N"
+spacing = "60 mm"
+[operation]
+speed = "6000 rpm"
+axial_load = "200 N"
+radial_load = "300 N"
+temperature = "45 degC"
+[heat]
+model = "skf"
+"""
+    + LUBRICANT,
+    "caged": """
+[bearing]
+catalogue = "7014 C HC"
+arrangement = [1, 1, -1]
+preload = "300 N"
+spacing = "40 mm"
+seal_moment = "0.02 N*m"
+[operation]
+speed = "6000 rpm"
+axial_load = "500 N"
+radial_load = "800 N"
+moment = "10 N*m"
+[heat]
+model = "full"
+[cage]
+land_diameter = "98 mm"
+land_width = "4 mm"
+clearance = "0.2 mm"
+land = "outer"
+[fit]
+inner_interference = "5 um"
+outer_clearance = "5 um"
+housing_outer_diameter = "170 mm"
+[temperatures]
+assembly = "20 degC"
+inner_ring = "45 degC"
+outer_ring = "40 degC"
+"""
+    + LUBRICANT,
+    "sealed_roller": """
+[bearing]
+catalogue = "NN3014 K"
+radial_clearance = "-2 um"
+seal_moment = "0.05 N*m"
+[operation]
+speed = "3000 rpm"
+radial_load = "2000 N"
+temperature = "45 degC"
+[heat]
+model = "skf"
+"""
+    + LUBRICANT,
+}
+
 
 def tables(text: str) -> dict[str, Any]:
     """Tables of one of the texts above."""

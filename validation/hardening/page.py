@@ -17,6 +17,8 @@ WHAT = {
     "definitions": "definitions of machines: `check`, then solved",
     "recordings": "recordings and manifests: `simulate`, `recording`, `diagnose`, `watch`",
     "studies": "studies and bearing files: `sweep`, `transient`, `bearing`",
+    "circuits": "definitions with ducts, streams, oil, unlike bearings, cages, seals: the same",
+    "bearings": "bearing files with deep grooves, cages, seals, fits, types of the catalogue",
     "folders": "result folders and caches: `report`, `view`, `sweep` again, `--restart`, meshes and models",
     "texts": "markup, templates, shell, paths as names: `simulate`, `view`, `export`, `run`",
     "kills": "kills (signal 9) at a random moment, then the same command again",

@@ -63,7 +63,8 @@ def solve_lumped(file: Path, overrides: list[str]) -> None:
     point = OperatingPoint.of(spec)
     state = solve_machine_network(build_machine_network(spec), point, heat_model=heat_model_of(spec))
     _require_sound(state.temperature, state.imbalance_relative)
-    below = point.coldest - float(state.temperature.min())
+    coldest = min([point.coldest, *(film.inlet_temperature for film in spec.circuits)])
+    below = coldest - float(state.temperature.min())
     if below > BELOW_COLDEST:
         raise UnsoundResultError(f"{below:.3g} K below the coldest surroundings")
 
@@ -80,6 +81,16 @@ def solve_written(file: Path, overrides: list[str]) -> None:
     inputs |= {name: ROOM for name in network.boundary_input if name is not None}
     state = solve_steady(network, inputs)
     _require_sound(state.temperature, state.imbalance_relative)
+    heat, around = network.node_heat(network.source_values(inputs)), state.boundary_temperature
+    below, above = (
+        float(around.min() - state.temperature.min()),
+        float(state.temperature.max() - around.max()),
+    )
+    for beyond, forbidden in ((below, (heat >= 0.0).all()), (above, (heat <= 0.0).all())):
+        if forbidden and beyond > BELOW_COLDEST:
+            raise UnsoundResultError(
+                f"{beyond:.3g} K beyond its surroundings without a source that does this"
+            )
 
 
 def _require_sound(temperature: np.ndarray, imbalance: float) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .child import run_command, run_process
 from .judged import OTHER_REFUSAL, Record
-from .material import BALL, COARSE, ROLLER, SPINDLE, SWEEP, TRANSIENT, tables
+from .material import BALL, BEARINGS, COARSE, ROLLER, SPINDLE, SWEEP, TRANSIENT, tables
 from .mutations import mutated
 
 EVERY_PROCESS = 50
@@ -33,4 +33,16 @@ def try_study(number: int, chance: random.Random, folder: Path) -> Record:
     record.step(kind, ended := run(arguments, folder), (2, OTHER_REFUSAL))
     if ended.stopped == "time" and (folder / "out" / "INCOMPLETE").is_file():
         record.long_work()
+    return record
+
+
+def try_bearing(number: int, chance: random.Random, folder: Path) -> Record:
+    """One mutated bearing file with what the plain ones of the studies do not have."""
+    record = Record("bearings", number)
+    kind = sorted(BEARINGS)[number % len(BEARINGS)]
+    content, done = mutated(chance, tables(BEARINGS[kind]))
+    record.done = [kind, *done]
+    (folder / "file.toml").write_bytes(content)
+    run = run_process if number % EVERY_PROCESS == 0 else run_command
+    record.step(kind, run(["bearing", "file.toml", "--json"], folder), (2, OTHER_REFUSAL))
     return record

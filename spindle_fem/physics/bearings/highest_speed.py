@@ -17,7 +17,7 @@ def highest_speed(pitch_diameter: float) -> float:
     >>> round(highest_speed(0.1) * 30.0 / np.pi)
     50000
     """
-    return _PITCH_SPEED / pitch_diameter if pitch_diameter else np.inf
+    return _PITCH_SPEED / pitch_diameter if pitch_diameter > 0.0 else np.inf
 
 
 def too_fast(spec: MachineSpec, speed: float) -> str | None:
@@ -25,10 +25,19 @@ def too_fast(spec: MachineSpec, speed: float) -> str | None:
     # In a definition with other faults, bearings may be of no known type.
     types = [spec.bearing_types.get(group.type_name(bearing)) for group, bearing in spec.bearings]
     pitch = max((kind.pitch for kind in types if kind is not None), default=0.0)
-    highest = highest_speed(pitch)
+    return why_too_fast(pitch, speed)
+
+
+def why_too_fast(pitch_diameter: float, speed: float) -> str | None:
+    """Why no bearing of a pitch diameter [m] turns at a speed [rad/s]; None where one may or it is NaN.
+
+    >>> why_too_fast(0.1, 6000.0)
+    'No rolling bearing of 100 mm pitch diameter runs above 50000 rpm; is the unit right?'
+    """
+    highest = highest_speed(pitch_diameter)
     if not abs(speed) > highest:
         return None
     return (
-        f"No rolling bearing of {1e3 * pitch:.0f} mm pitch diameter runs above "
+        f"No rolling bearing of {1e3 * pitch_diameter:.0f} mm pitch diameter runs above "
         f"{highest * 30.0 / np.pi:.0f} rpm; is the unit right?"
     )
