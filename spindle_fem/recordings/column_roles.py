@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spindle_fem.errors import UnitError
+from spindle_fem.recordings.column_units import why_no_unit
 from spindle_fem.recordings.column_words import (
     OUTLET_WORDS,
     USUAL_UNITS,
@@ -122,11 +123,11 @@ def _warm_without_unit(name: str, values: np.ndarray) -> tuple[bool, str]:
     present = values[np.isfinite(values)]
     taken = f"taken as {'K' if _like_kelvin(present) else '°C'}"
     if says_temperature(name) and (_between(present, *_PLAUSIBLE) or _like_kelvin(present)):
-        return True, f"no unit is stated: {taken}"
+        return True, f"{why_no_unit(name)}: {taken}"
     if says_place(name) and (_between(present, *_ON_MACHINES) or _like_kelvin(present)):
-        return True, f"no unit is stated: the name is of a place, the size of a temperature, {taken}"
+        return True, f"{why_no_unit(name)}: the name is of a place, the size of a temperature, {taken}"
     if _moves_like_temperature(values) and _looks_like_sensor(name):
-        return True, "no unit is stated: size and slow course are those of a temperature"
+        return True, f"{why_no_unit(name)}: size and slow course are those of a temperature"
     return False, ""
 
 
@@ -169,7 +170,7 @@ def _input(
         usual = next((item for item, words in USUAL_UNITS.items() if says(name, words)), "W")
         unit = _UNITS.get(drives, inputs[drives] or usual)
         unit = _temperature_unit(present) if inputs[drives] == "K" else unit
-        doubt = "; ".join(filter(None, [doubt, f"no unit is stated: taken as {unit}"]))
+        doubt = "; ".join(filter(None, [doubt, f"{why_no_unit(name)}: taken as {unit}"]))
     hold = "previous" if _stands_still(present) and inputs[drives] != "K" else "linear"
     taken.add(drives)
     channel = Channel(column=name, role="input", drives=drives, unit=unit, hold=hold)

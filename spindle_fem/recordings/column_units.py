@@ -28,10 +28,13 @@ _WRITINGS = {
     "u/min": "rpm",
     "upm": "rpm",
     "rpm": "rpm",
+    "r/min": "rpm",
+    "tr/min": "rpm",
     "%": "percent",
     "l/min": "l/min",
     "lpm": "l/min",
     "l/h": "l/hour",
+    "gpm": "gallon/min",
     "m³/h": "m**3/hour",
     "m3/h": "m**3/hour",
     "µm": "um",
@@ -42,6 +45,7 @@ _WRITINGS = {
     "std": "hour",
     "min": "min",
     "nm": "N*m",
+    "ps": "metric_horsepower",
 }
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
 _SLASH = re.compile(r"^(?P<name>.*?\S)\s+(?:/|in)\s+(?P<unit>\S+(?: C)?)$")
@@ -114,6 +118,17 @@ def without_unit(name: str) -> tuple[str, str]:
         if plain and _is_no_word(last):
             return plain, unit_of_text(last)
     return name.strip(), ""
+
+
+def why_no_unit(name: str) -> str:
+    """Why a column without a unit has none: none stated, or brackets with something else.
+
+    >>> why_no_unit("flow"), why_no_unit("flow (cfs)")
+    ('no unit is stated', '"cfs" is not known as a unit')
+    """
+    match = _BRACKETS.match(name.strip())
+    inside = match["unit"].strip() if match else ""
+    return f'"{inside}" is not known as a unit' if inside else "no unit is stated"
 
 
 def _is_no_word(text: str) -> bool:

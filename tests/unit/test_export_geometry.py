@@ -105,6 +105,32 @@ def agrees(fast, drive):
 
 
 @pytest.fixture(scope="module")
+def turning():
+    """A spindle cooled by water that turns turbulent at about the definition's flow."""
+    changes = ["coolant.fluid=water", "coolant.film_model=helical", "coolant.flow=5 L/min"]
+    spec = load_machine("recorded_spindle", changes)
+    return fast_spindle(lumped_model(spec), spec)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("litres", "inlet"), [(5.7, 294.15), (6.5, 287.15), (4.0, 297.15)])
+def test_a_film_that_turns_turbulent_over_flow_and_inlet_is_that_of_simulate(turning, litres, inlet):
+    model = agrees(turning, driven(flow=litres / 60e3, inlet=inlet))
+    # the films bend at one Reynolds number, along no line of flow or inlet
+    assert model.header["table_inputs"]["coolant"] == [-1, model.inputs.index("coolant_inlet")]
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_c_scales_the_flow_as_python_does(turning, tmp_path):
+    space, path = geometry_state_space(turning, "lumped", 4500.0 * RPM), tmp_path / "model.c"
+    file_writer(path)(space, path)
+    drive = driven(flow=5.7 / 60e3)
+    found = c_readings_along(tmp_path, "lumped", space.model(), drive, START)
+    np.testing.assert_allclose(found, readings_along(space.model(), drive, {0: START}), rtol=0.0, atol=1e-9)
+
+
+@pytest.fixture(scope="module")
 def warmed():
     """A spindle whose film in the channel follows the wall."""
     spec = load_machine("recorded_spindle", ["coolant.properties_at=bulk"])

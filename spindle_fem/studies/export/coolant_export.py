@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, RegularGridInterpolator
 
 from spindle_fem.errors import SpecError
 from spindle_fem.model.reduced.coolant_maps import coolant_maps
@@ -20,26 +20,31 @@ from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.standard_inputs import standard_inputs
 from spindle_fem.studies.export.effect_export import ExportedEffects
 from spindle_fem.studies.export.feedback_export import FeedbackTable
-from spindle_fem.studies.export.interpolation_axes import refined_axis
+from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
 from spindle_fem.studies.export.operator_tables import PARTS, OperatorTable
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
-# Relative error of films and coefficients between the points of a table.
-TOLERANCE = 5e-5
+# Relative error of films and coefficients between the points of a table; this many times that of friction,
+# which warms the coolant by tenths of a kelvin, and over scaled flows, which reach further.
+TOLERANCE, OF_FRICTION, OF_SCALED = 5e-5, 10.0, 2.0
 # Directions of the coolant's operators are left out below this relative variation.
 LEFT_OUT = 1e-7
 # Rounding error of squares of samples, relative.
 ROUND_OFF = 1e-15
 # Points of the coolant's table; samples that its directions are taken from.
-MOST_POINTS, MOST_SAMPLES = 3000, 300
+MOST_POINTS, MOST_SAMPLES = 5000, 300
 # Mean rises of the channel's wall above the inlet, K: where films are worked out, and points of the table.
 RISES, RISE_AXIS = np.linspace(-15.0, 30.0, 10), np.linspace(-15.0, 30.0, 46)
 # The wall changes the film only a little: fewer flows and directions suffice.
 WALL_TOLERANCE, WALL_LEFT_OUT = 2e-3, 3e-6
 # Least mean of a wall's rise, as a share of its largest, by which it can be scaled.
 LEAST_MEAN = 0.2
+# A table is held against this many flows and inlets; beyond this relative departure the flow is scaled by
+# viscosity: where a flow turns turbulent, at one Reynolds number, its films bend.
+CHECKED, LARGEST_DEPARTURE = 15, 5e-4
+SCALED_FLOW, SCALE_POINTS = "scaled_flow", 121
 # After which no wall moves any more, and its steps, s.
 SETTLED, SETTLING_STEP = 3.0 * 86400.0, 3600.0
 
@@ -81,6 +86,35 @@ class WallRise:
 
 
 @dataclass(frozen=True, slots=True)
+class FlowScale:
+    """Factor on a flow that makes it the one of equal Reynolds number at the definition's inlet temperature.
+
+    Attributes
+    ----------
+    inlet, factor : (n,) ndarray, [°C], [-]
+        Straight between these.
+    """
+
+    inlet: Array
+    factor: Array
+
+    @classmethod
+    def of(cls, fluid: str, usual: float, inlets: tuple[float, float]) -> FlowScale:
+        """Scale of a coolant about a usual inlet temperature, over a range, all in °C.
+
+        >>> [round(FlowScale.of("water", 20.0, (10.0, 40.0)).at(inlet), 2) for inlet in (10.0, 20.0, 40.0)]
+        [0.77, 1.0, 1.53]
+        """
+        inlet = np.unique([*np.linspace(*inlets, SCALE_POINTS), usual])
+        viscosity = coolant_by_name(fluid).properties(inlet + ZERO_CELSIUS_K).kinematic_viscosity
+        return cls(inlet, viscosity[np.searchsorted(inlet, usual)] / viscosity)
+
+    def at(self, inlet: float) -> float:
+        """Factor at an inlet temperature [°C]."""
+        return float(np.interp(inlet, self.inlet, self.factor))
+
+
+@dataclass(frozen=True, slots=True)
 class CoolantOperators:
     """Contribution of the coolant to a fast model's operators.
 
@@ -88,15 +122,67 @@ class CoolantOperators:
     ----------
     wall : WallRise or None
         None where films do not follow the wall, or to have it at the inlet's temperature.
+    scaling : FlowScale or None
+        Where given, every ``flow`` of the methods is a scaled one.
     """
 
     fast: FastModel
     effects: ExportedEffects
     nominal: OperatingPoint
     wall: WallRise | None
+    scaling: FlowScale | None = None
+
+    def over(self, flows: tuple[float, float], inlets: tuple[float, float]) -> CoolantOperators:
+        """These, over scaled flows where tables over flows [m³/s] and inlets [°C] would not hold the films.
+
+        Raises
+        ------
+        SpecError
+            Neither does.
+        """
+        fluid, usual = self.fast.spec.coolant.fluid, self.nominal.coolant_inlet_temperature - ZERO_CELSIUS_K
+        for scaling in (None, FlowScale.of(fluid, usual, inlets)):
+            found = replace(self, scaling=scaling)
+            if found.departure(flows, inlets) <= LARGEST_DEPARTURE:
+                return found
+        raise SpecError(
+            "coolant",
+            f"its film changes so sharply that no table holds it within {100.0 * LARGEST_DEPARTURE:g} %.",
+            "Export the machine without the effect or correlation that jumps; simulate takes it.",
+        )
+
+    def departure(self, flows: tuple[float, float], inlets: tuple[float, float]) -> float:
+        """Largest relative departure of films between the points of the axes; infinite for too many."""
+        axes = self.axes(flows, inlets)
+        if axes[0].size * axes[1].size > MOST_POINTS:
+            return np.inf
+        table = RegularGridInterpolator(axes, values_on(self.means, axes))
+        # neither ends nor middles of the axes, where tables hold by their making
+        shares = (np.arange(CHECKED) + 0.3819) / CHECKED
+        found = 0.0
+        for flow, inlet in product(*(low + shares * (high - low) for low, high in (flows, inlets))):
+            place = self.place(flow, inlet), inlet
+            meant = self.means(*place)
+            found = max(found, float(np.abs(table(place).ravel() / meant - 1.0).max()))
+        return found
+
+    @property
+    def table_inputs(self) -> tuple[str, str]:
+        """Axes of the tables."""
+        return "coolant_flow" if self.scaling is None else SCALED_FLOW, "coolant_inlet"
+
+    def place(self, flow: float, inlet: float) -> float:
+        """Flow [m³/s] as the tables have it."""
+        return flow if self.scaling is None else flow * self.scaling.at(inlet)
+
+    def means(self, flow: float, inlet: float) -> Array:
+        """Mean film and capacity rate, (2,)."""
+        cells, rate, _ = self.film(flow, inlet)
+        return np.array([cells.mean(), rate])
 
     def film(self, flow: float, inlet: float, rise: float | None = None) -> tuple[Array, float, float]:
         """Film of each cell, capacity rate and friction heat at a flow [m³/s], inlet [°C], mean rise [K]."""
+        flow = flow if self.scaling is None else flow / self.scaling.at(inlet)
         point = replace(self.nominal, coolant_flow=flow, coolant_inlet_temperature=inlet + ZERO_CELSIUS_K)
         if self.wall is not None:
             point = self.at_wall(point, rise)
@@ -150,33 +236,34 @@ class CoolantOperators:
         ----------
         flows, inlets : (low, high)
         tolerance : float, [-]
-
-        Raises
-        ------
-        SpecError
-            A film that needs too many.
         """
         flow, inlet = (
             self.nominal.coolant_flow,
             self.nominal.coolant_inlet_temperature - ZERO_CELSIUS_K,
         )
 
+        beside = [flow]
+        if self.scaling is not None:
+            factors = [self.scaling.at(end) for end in (*inlets, inlet)]
+            flows = flows[0] * min(factors), flows[1] * max(factors)
+            beside, tolerance = [*flows, flow], OF_SCALED * tolerance
+
+        area = float(self.fast.model.cell_area.sum())
+
         def values(flow: float, inlet: float) -> Array:
             cells, rate, friction = self.film(flow, inlet)
-            return np.array([cells.mean(), rate, friction])
+            # what the coolant takes of an even wall, the bend that operators have over a film
+            taken = -rate * np.expm1(-cells.mean() * area / rate)
+            return np.array([cells.mean(), rate, taken, friction])
 
-        found = (
-            refined_axis(lambda at: values(at, inlet), *flows, tolerance),
-            refined_axis(lambda at: values(flow, at), *inlets, tolerance),
+        def over_inlets(inlet: float) -> Array:
+            return np.concatenate([values(flow, inlet) for flow in beside])
+
+        allowed = tolerance * np.array([1.0, 1.0, 1.0, OF_FRICTION])
+        return (
+            refined_axis(lambda at: values(at, inlet), *flows, allowed),
+            refined_axis(over_inlets, *inlets, np.tile(allowed, len(beside))),
         )
-        points = found[0].size * found[1].size
-        if points > MOST_POINTS:
-            raise SpecError(
-                "coolant",
-                f"its film changes so sharply that a table would need {points} points.",
-                "Export the machine without the effect or correlation that jumps; simulate takes it.",
-            )
-        return found
 
 
 def coolant_table(coolant: CoolantOperators, axes: tuple[Array, Array]) -> OperatorTable:
@@ -187,7 +274,7 @@ def coolant_table(coolant: CoolantOperators, axes: tuple[Array, Array]) -> Opera
     places = list(product(*axes))
     basis, weights = _directions(lambda place: (coolant.sample(*place) - base) / scale, places, LEFT_OUT)
     values = weights.reshape(*(axis.size for axis in axes), -1)
-    return OperatorTable(("coolant_flow", "coolant_inlet"), axes, values, coolant.parts(basis * scale))
+    return OperatorTable(coolant.table_inputs, axes, values, coolant.parts(basis * scale))
 
 
 def _directions(
@@ -259,7 +346,7 @@ def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> Feedb
     return FeedbackTable(
         wall.sense,
         {"coolant_inlet": -1.0},
-        ("coolant_flow", "coolant_inlet"),
+        coolant.table_inputs,
         (RISE_AXIS, *axes),
         values,
         np.array(column),

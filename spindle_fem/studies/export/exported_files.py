@@ -154,6 +154,7 @@ def _c_content(space: StateSpace) -> dict[str, Any]:
         "magnitudes": [int(item["magnitude"]) for item in header["inputs"]],
         "arrays": {name.replace(".", "_"): values for name, values in kept.items()},
         "tables": tables,
+        "scaled_flow": header.get("scaled_flow"),
         "most_axes": max((len(table["grids"]) for table in tables), default=1),
         "weights": max(1, _columns(tables, "operator")),
         "factors": _columns(tables, "feedback"),

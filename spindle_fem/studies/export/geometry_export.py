@@ -13,6 +13,7 @@ from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.standard_inputs import standard_inputs
 from spindle_fem.studies.export.coolant_export import (
+    SCALED_FLOW,
     WALL_TOLERANCE,
     CoolantOperators,
     WallRise,
@@ -95,6 +96,7 @@ def _state_space(
     coolant = CoolantOperators(fast, effects, nominal, wall)
     if fast.channel is not None:
         ends = _flow_range(nominal), _inlet_range(spec)
+        coolant = coolant.over(*ends)
         tables["coolant"] = coolant_table(coolant, coolant.axes(*ends))
     tables = {key: table for key, table in tables.items() if table.values.shape[-1]}
     # Loads that are inputs or constants come first, those of tables behind.
@@ -143,6 +145,10 @@ def _state_space(
     outputs = {channel: "um" if channel in sensors else CELSIUS for channel in fast.channels}
     header = header_of(name, TR_BDF2, LARGEST_STEP, inputs, outputs, loads)
     header["notes"] += [*sources.notes, *effects.notes]
+    if coolant.scaling is not None:
+        header[SCALED_FLOW] = [position[name] for name in ("coolant_flow", "coolant_inlet")]
+        position[SCALED_FLOW] = -1
+        arrays |= {"scaled_flow.axis": coolant.scaling.inlet, "scaled_flow.values": coolant.scaling.factor}
 
     def add_table(key: str, kind: str, axes: tuple[Array, ...], numbers: list[int], values: Array) -> None:
         header[kind].append(key)

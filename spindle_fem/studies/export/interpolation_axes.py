@@ -6,7 +6,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ NARROWEST = 1e-6
 LEAST_VALUE = 1e-2
 
 
-def refined_axis(function: Callable[[float], Array], low: float, high: float, tolerance: float) -> Array:
+def refined_axis(function: Callable[[float], Array], low: float, high: float, tolerance: ArrayLike) -> Array:
     """Points between which straight lines hold every value of a function.
 
     Intervals are halved until the values in their middle are those of the straight line.
@@ -28,7 +28,7 @@ def refined_axis(function: Callable[[float], Array], low: float, high: float, to
         Of a place on the axis, to values (n,).
     low, high : float
         Ends of the axis, among the points.
-    tolerance : float, [-]
+    tolerance : float or (n,) array_like, [-]
         Largest departure, as a share of the value at that place, or of a hundredth of the largest.
 
     Returns
@@ -48,7 +48,7 @@ def refined_axis(function: Callable[[float], Array], low: float, high: float, to
         middle = 0.5 * (begin + end)
         value = function(middle)
         between = 0.5 * (found[begin] + found[end])
-        if np.all(np.abs(value - between) <= tolerance * np.maximum(np.abs(value), least)):
+        if np.all(np.abs(value - between) <= np.asarray(tolerance) * np.maximum(np.abs(value), least)):
             continue
         if end - begin <= 2.0 * NARROWEST * (high - low):
             continue

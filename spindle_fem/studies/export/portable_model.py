@@ -122,11 +122,18 @@ class PortableModel:
         """A table's row at usable inputs: linear between the points of its axes."""
         found = self.arrays[f"{name}.values"]
         for axis, number in enumerate(self.header["table_inputs"][name]):
-            grid, value = self.arrays[f"{name}.axis{axis}"], values[number]
+            grid = self.arrays[f"{name}.axis{axis}"]
+            value = self._scaled_flow(values) if number < 0 else values[number]
             left = min(max(int(np.searchsorted(grid, value, side="right")) - 1, 0), len(grid) - 2)
             part = (value - grid[left]) / (grid[left + 1] - grid[left])
             found = (1.0 - part) * found[left] + part * found[left + 1]
         return found
+
+    def _scaled_flow(self, values):
+        """Flow of the coolant that has its Reynolds number at the usual inlet temperature."""
+        flow, inlet = self.header["scaled_flow"]
+        factors = self.arrays["scaled_flow.axis"], self.arrays["scaled_flow.values"]
+        return values[flow] * np.interp(values[inlet], *factors)
 
     def matrices(self, values):
         """K, B, C and D at usable inputs."""
