@@ -60,13 +60,13 @@ RULE = (
 GROOVE_RULE = (
     "boundary dimensions of ISO 15; ball diameter the largest multiple of 1/32 inch of at most 0.60 of "
     "the section's height, as many balls as fill an arc of 195 degrees and one more; shoulders 0.6 ball "
-    "diameters from the pitch circle; groove radii of 0.52 ball diameters; 10 µm of clearance as mounted"
+    "diameters from the pitch circle; groove radii of 0.52 ball diameters"
 )
 
 ROLLER_RULE = (
     "boundary dimensions of ISO 15; the outer raceway a quarter of the section's height inside the outside "
     "diameter; rollers of whole millimetres nearest to 0.45 of the section's height, as long as thick, 0.9 "
-    "of that length bearing, as many as fill 0.85 of the pitch circle; no clearance as mounted"
+    "of that length bearing, as many as fill 0.85 of the pitch circle"
 )
 
 # N/mm² of the pitch circle's square: heavy preload of a pair with 15 and with 25 degrees, by series.

@@ -121,6 +121,8 @@ def _bearing_types(content: dict[str, Any], assumed: list[Assumption]) -> None:
         types[name] = _under(found, table)
         if taken:
             text = f"{designation}: {bearing_catalogue.estimated(types[name])}"
+            if "radial_clearance" in taken:
+                text += f"; {found['radial_clearance'].replace('um', 'µm')} of clearance as mounted"
             assumed.append(Assumption(f"bearing_types.{name}", text))
         types[name] = _with_angle(types[name])
 

@@ -159,3 +159,12 @@ def test_balls_that_are_alike_are_shown_when_asked_for(tmp_path, capsys):
     # a set fails where its weakest bearing does, a little earlier
     lives = [bearing["rating_life_h"] for bearing in solved["bearings"]]
     assert 0.8 * min(lives) < solved["rating_life_h"] < min(lives)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"), [((), True), (("bearing_types.sealed.radial_clearance=8 um",), False)]
+)
+def test_a_clearance_that_is_given_is_not_called_assumed(change, said):
+    assumed = str(check_machine("groove_spindle", overrides=change)["assumed"])
+    assert "as many balls as fill" in assumed
+    assert ("10 µm of clearance as mounted" in assumed) == said
