@@ -60,7 +60,8 @@ def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
         told = predictor.predict(number, fit.values, fit.candidates).temperature
         matrix, rest = [], []
         for item in (*predictor.observations, *predictor.heldout):
-            if item.recording == number:
+            # The constant of a displacement is free: temperatures tell.
+            if item.recording == number and not item.bins.is_relative:
                 noise = np.hypot(item.bins.white, fit.slow.sigma)
                 own = np.column_stack([slope[:, item.channel] for slope in slopes.values()])
                 matrix.append(item.at(own) / noise)
