@@ -16,7 +16,7 @@ from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import direction_columns, misdescriptions_of
 from spindle_fem.inference.observations import Observation, observe
 from spindle_fem.inference.prediction import Prediction
-from spindle_fem.inference.predictor import STEP, Predictor
+from spindle_fem.inference.predictor import STEP, Predictor, run_name
 from spindle_fem.inference.structural_misdescriptions import StructuralChange, model_with_directions
 from spindle_fem.model.reduced.defined_effects import ActiveEffects
 from spindle_fem.model.reduced.drive import Drive
@@ -64,9 +64,7 @@ class _Piece(Predictor):
         if self._begun is None:
             return super().start(number, values, derivatives)
         state, tangents = self._begun
-        by = {
-            own: tangents[name][None] for name in tangents if (own := self._run_name(0, name, ())) is not None
-        }
+        by = {own: tangents[name][None] for name in tangents if (own := run_name(0, name)) is not None}
         return Start(np.zeros(1, dtype=np.int64), state[None], by)
 
 

@@ -273,7 +273,7 @@ class Predictor:
         """Factors of the machine's parameters in the run of one recording."""
         factors: dict[str, float] = dict(self.effects.factors)
         for name, value in values.items():
-            own = None if name in known or name in readings else _run_name(number, name)
+            own = None if name in known or name in readings else run_name(number, name)
             if own is not None:
                 factors[own] = factors.get(own, 1.0) * value
         return factors
@@ -349,7 +349,7 @@ class Predictor:
         shared = {name for c in acting for term in c.terms for name in term.names()}
         of_readings = {f"{r.name}.{item.name}" for r in _readings(acting) for item in r.parameters}
         outside = (of_readings - shared) | idle
-        inner = [None if name in outside else _run_name(number, name) for name in derivatives]
+        inner = [None if name in outside else run_name(number, name) for name in derivatives]
         of_run = tuple(dict.fromkeys(own for own in inner if own is not None))
         initial = self.start(number, values, of_run)
         if self.at_stamps:
@@ -474,7 +474,7 @@ def _readings(candidates: Sequence[Candidate]) -> list[Reading]:
 
 
 @lru_cache(maxsize=65536)
-def _run_name(number: int, name: str) -> str | None:
+def run_name(number: int, name: str) -> str | None:
     """Name of a coordinate in the run of one recording; None if it does not enter."""
     if name.startswith(FIRST_ORDER):
         return None
