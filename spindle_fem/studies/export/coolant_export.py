@@ -132,8 +132,12 @@ class CoolantOperators:
     wall: WallRise | None
     scaling: FlowScale | None = None
 
-    def over(self, flows: tuple[float, float], inlets: tuple[float, float]) -> CoolantOperators:
-        """These, over scaled flows where tables over flows [m³/s] and inlets [°C] would not hold the films.
+    def over(
+        self, flows: tuple[float, float], inlets: tuple[float, float]
+    ) -> tuple[CoolantOperators, tuple[Array, Array]]:
+        """These with the axes of their tables over flows [m³/s] and inlets [°C]; scaled flows where needed.
+
+        Needed they are where tables over flows as they are would not hold the films.
 
         Raises
         ------
@@ -143,17 +147,19 @@ class CoolantOperators:
         fluid, usual = self.fast.spec.coolant.fluid, self.nominal.coolant_inlet_temperature - ZERO_CELSIUS_K
         for scaling in (None, FlowScale.of(fluid, usual, inlets)):
             found = replace(self, scaling=scaling)
-            if found.departure(flows, inlets) <= LARGEST_DEPARTURE:
-                return found
+            axes = found.axes(flows, inlets)
+            if found.departure(axes, flows, inlets) <= LARGEST_DEPARTURE:
+                return found, axes
         raise SpecError(
             "coolant",
             f"its film changes so sharply that no table holds it within {100.0 * LARGEST_DEPARTURE:g} %.",
             "Export the machine without the effect or correlation that jumps; simulate takes it.",
         )
 
-    def departure(self, flows: tuple[float, float], inlets: tuple[float, float]) -> float:
+    def departure(
+        self, axes: tuple[Array, Array], flows: tuple[float, float], inlets: tuple[float, float]
+    ) -> float:
         """Largest relative departure of films between the points of the axes; infinite for too many."""
-        axes = self.axes(flows, inlets)
         if axes[0].size * axes[1].size > MOST_POINTS:
             return np.inf
         table = RegularGridInterpolator(axes, values_on(self.means, axes))

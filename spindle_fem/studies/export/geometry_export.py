@@ -96,8 +96,8 @@ def _state_space(
     coolant = CoolantOperators(fast, effects, nominal, wall)
     if fast.channel is not None:
         ends = _flow_range(nominal), _inlet_range(spec)
-        coolant = coolant.over(*ends)
-        tables["coolant"] = coolant_table(coolant, coolant.axes(*ends))
+        coolant, axes = coolant.over(*ends)
+        tables["coolant"] = coolant_table(coolant, axes)
     tables = {key: table for key, table in tables.items() if table.values.shape[-1]}
     # Loads that are inputs or constants come first, those of tables behind.
     n_heat, n_load = len(fast.heat_places), len(fast.load_names)
