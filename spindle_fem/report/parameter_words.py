@@ -31,9 +31,9 @@ def parameter_words(name: str, recordings: Sequence[str] = ()) -> str:
         Names; one is named where there are several.
 
     >>> parameter_words("jump.0.3"), parameter_words("probe.FRONT.r")
-    ('instant of unread change 4 of an input', 'place of probe FRONT along the radius')
+    ('instant of change 4 of an input between rows', 'place of probe FRONT along the radius')
     >>> parameter_words("within_gap.1.0", ["monday", "friday"])
-    'heat or inlet within piece 1 of the gaps (friday)'
+    'heat or inlet in stretch 1 between rows (friday)'
     >>> parameter_words("misdescribed_in.0.standing_coolant.RETURN.20s")
     'recording: standing coolant, RETURN, 20s'
     >>> parameter_words("joint.front_seats")
@@ -43,8 +43,8 @@ def parameter_words(name: str, recordings: Sequence[str] = ()) -> str:
         if name.startswith(prefix):
             number, _, rest = name.removeprefix(prefix).partition(".")
             told = {
-                JUMP_PREFIX: lambda key: f"instant of unread change {int(key) + 1} of an input",
-                GAP_PREFIX: lambda key: f"heat or inlet within piece {int(key) + 1} of the gaps",
+                JUMP_PREFIX: lambda key: f"instant of change {int(key) + 1} of an input between rows",
+                GAP_PREFIX: lambda key: f"heat or inlet in stretch {int(key) + 1} between rows",
                 START_PREFIX: lambda key: f"{_plain(key.removeprefix('initial.'))} at the start",
                 MISDESCRIBED_IN_PREFIX: lambda key: f"recording: {_plain(key)}",
             }[prefix](rest)

@@ -370,7 +370,7 @@ def test_of_many_parameters_those_are_drawn_that_moved_and_in_words():
     shown = [item.get_text().replace("\n", " ") for item in texts_of(figure)]
     assert not clipped(figure)
     assert figure.get_size_inches()[1] * figure.dpi < 2200.0
-    assert "heat or inlet within piece 30 of the gaps" in shown
+    assert "heat or inlet in stretch 30 between rows" in shown
     assert "place of probe FRONT along the radius" in shown
     assert not [text for text in shown if "jump" in text or "misdescribed" in text]
     assert any("77 more" in text for text in shown)
