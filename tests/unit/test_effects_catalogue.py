@@ -465,7 +465,8 @@ def test_a_conductance_of_a_network_may_be_right_at_larger_differences(machines)
         return [c for c in candidates_for(machines[kind][2]) if c.effect == "natural_convection"]
 
     by_name = {p.name: p for c in offered("network") for p in c.parameters.values()}
-    assert by_name["carried_share"].high > 3.0**0.5 > 1.0
+    # growth at 30 K with the power of a half
+    assert by_name["carried_share"].high > (30.0 / 10.0) ** 0.5
     for candidate in offered("network"):
         starts = [value for start in candidate.starts for value in start.values()]
         assert sorted(starts) == [1.0, 1.6]
