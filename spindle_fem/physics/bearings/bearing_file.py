@@ -35,7 +35,7 @@ from spindle_fem.physics.bearings.cage_guidance import CageGuidance
 from spindle_fem.physics.bearings.fits import RingFits, fit_faults
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
-from spindle_fem.physics.bearings.highest_speed import why_too_fast
+from spindle_fem.physics.bearings.highest_speed import file_speed_faults
 from spindle_fem.physics.bearings.mounting import (
     BearingSet,
     BearingTemperatures,
@@ -159,9 +159,7 @@ def _build_case(
     probe = _Unchecked(**geometry_values)
     for key, what, how_to_fix in bearing_faults(probe):
         faults.append(SpecError(f"{file}: bearing.{key}", what, how_to_fix))
-    if too_fast := why_too_fast(bearing["pitch_diameter"], operation["speed"]):
-        rpm = operation["speed"] * 30.0 / math.pi
-        faults.append(SpecError(f"{file}: operation.speed", f"speed is {rpm:g} rpm.", too_fast))
+    faults += file_speed_faults(file, bearing["pitch_diameter"], operation["speed"])
     _check_operation(operation, orientations, file, faults)
     preload = bearing.get("preload", 0.0)
     if preload < 0.0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.errors import SpecError
 
 # Speed times pitch diameter, m·rad/s: 5 million mm/min. On a rig, ball bearings of 120 mm bore (pitch
 # diameter 155 mm) ran at 25,000 rpm, 3.9 million: Zaretsky, Bamberger and Signer (1974), NASA TN D-7837.
@@ -26,6 +27,13 @@ def too_fast(spec: MachineSpec, speed: float) -> str | None:
     types = [spec.bearing_types.get(group.type_name(bearing)) for group, bearing in spec.bearings]
     pitch = max((kind.pitch for kind in types if kind is not None), default=0.0)
     return why_too_fast(pitch, speed)
+
+
+def file_speed_faults(file: str, pitch_diameter: float, speed: float) -> list[SpecError]:
+    """Fault of a bearing file whose bearing [m] cannot turn at its speed [rad/s]."""
+    why = why_too_fast(pitch_diameter, speed)
+    what = f"speed is {speed * 30.0 / np.pi:g} rpm."
+    return [SpecError(f"{file}: operation.speed", what, why)] if why else []
 
 
 def why_too_fast(pitch_diameter: float, speed: float) -> str | None:

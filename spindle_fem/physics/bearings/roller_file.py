@@ -24,7 +24,7 @@ from spindle_fem.physics.bearings.bearing_tables import (
 )
 from spindle_fem.physics.bearings.heat_model import HeatOptions, friction_model_names
 from spindle_fem.physics.bearings.hertz import INNER, OUTER
-from spindle_fem.physics.bearings.highest_speed import why_too_fast
+from spindle_fem.physics.bearings.highest_speed import file_speed_faults
 from spindle_fem.physics.bearings.mounting import ExternalLoad, uniform_temperatures
 from spindle_fem.physics.bearings.roller_bearing import RollerGeometry, RollerStates, solve_roller_bearing
 from spindle_fem.physics.bearings.roller_set import RollerSet, solve_roller_set
@@ -111,9 +111,7 @@ def roller_report(path: str | Path) -> dict[str, Any]:
             for key in ("speed", "radial_load")
             if operation[key] < 0.0
         ]
-        if too_fast := why_too_fast(bearing["pitch_diameter"], operation["speed"]):
-            rpm = operation["speed"] * 30.0 / math.pi
-            faults.append(SpecError(f"{file}: operation.speed", f"speed is {rpm:g} rpm.", too_fast))
+        faults += file_speed_faults(file, bearing["pitch_diameter"], operation["speed"])
         heat = heat_of({"model": "palmgren", **tables.get("heat", {})}, file, faults)
         known = friction_model_names(rollers=True)
         if heat.level not in known:
