@@ -99,7 +99,7 @@ def radial_profiles(result: ThermalResult, section: MeridianSection) -> Figure |
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
     height = 100.0 + 400.0 * rows + 80.0
     figure.subplots_adjust(
-        left=0.055, right=0.99, top=1.0 - 138.0 / height, bottom=100.0 / height, wspace=0.08, hspace=0.36
+        left=0.066, right=0.99, top=1.0 - 138.0 / height, bottom=100.0 / height, wspace=0.08, hspace=0.36
     )
     kinds = {"rotating": CYCLE[1], "standing": CYCLE[0]}
     for axes, (group, bearing) in zip(grid.flat, bearings, strict=False):

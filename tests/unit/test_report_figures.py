@@ -28,7 +28,9 @@ from spindle_fem.report.heat_charts import CHARTS
 from spindle_fem.report.leader_labels import spread
 from spindle_fem.report.machine_drawing import channel_sections, machine_drawing, part_colours
 from spindle_fem.report.read_against_predicted import Course, courses_figure
+from spindle_fem.report.run_outputs import draw_charts
 from spindle_fem.studies.heat_study import heat_study
+from tests.support.made_result import make_result
 
 
 @given(st.lists(st.tuples(st.floats(-50, 150), st.floats(1, 9)), min_size=1, max_size=10))
@@ -235,6 +237,12 @@ def test_no_label_of_a_machine_is_clipped_or_lies_on_another(name):
     for number, (item, box) in enumerate(boxes):
         for other, its in boxes[number + 1 :]:
             assert not box.overlaps(its), f"{item.get_text()} on {other.get_text()}"
+
+
+def test_no_label_of_profiles_is_clipped():
+    charts = draw_charts(make_result())
+    for name in ("axial_profiles", "radial_profiles"):
+        assert not clipped(charts[name]())
 
 
 def test_no_label_of_heat_charts_is_clipped_and_lines_under_others_are_wider():
