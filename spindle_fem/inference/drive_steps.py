@@ -9,16 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.inference.recording_gaps import GAP_STEPS, long_spacings
-from spindle_fem.model.reduced.drive import Drive, classes_of, covariate_columns, drive_of_recording
+from spindle_fem.model.reduced.drive import (
+    ClassWidths,
+    Drive,
+    classes_of,
+    covariate_columns,
+    drive_of_recording,
+)
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
 
-# Width of a class of oil temperatures, K: 3 K change film and capacity by 0.1 %, readings by millikelvins.
-INLET_BIN = 3.0
-# Width of a class of speeds as a share of the highest: films that follow speed are small beside the oil's.
-SPEED_BIN = 0.01
+# 3 K of oil change film and capacity by 0.1 %, readings by millikelvins; films that follow speed are small
+# beside the oil's.
+DIAGNOSED = ClassWidths(3.0, 0.01, 0.01, 120)
 # Oil temperatures of classes are rounded to this, K: classes of one temperature share the channel's maps.
 INLET_STEP = 0.5
 
@@ -60,7 +65,7 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
         part = ((at - fine.grid[owner]) / fine.steps[owner])[:, None]
         ends[:] = fine.start[owner] + part * (fine.end[owner] - fine.start[owner])
     start[:, beside] = end[:, beside] = _means(fine, grid)[:, beside]
-    step_class, points = classes_of(0.5 * (start + end), INLET_BIN, SPEED_BIN)
+    step_class, points = classes_of(0.5 * (start + end), DIAGNOSED)
     # Clipped to the range that occurs, so that no property is evaluated outside it.
     inlets = np.array([p.coolant_inlet_temperature for p in points])
     steps = np.round((inlets - inlets.min()) / INLET_STEP) * INLET_STEP

@@ -40,7 +40,7 @@ from spindle_fem.inference.recording_gaps import (
     unseen_jumps,
 )
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
-from spindle_fem.model.reduced.drive import Drive, drive_of_recording, inputs_at
+from spindle_fem.model.reduced.drive import FITTED, Drive, drive_of_recording, inputs_at
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
 from spindle_fem.model.reduced.run_start import Start
@@ -118,7 +118,7 @@ class Predictor:
         """Inputs of a recording, and the times at which its channels are predicted."""
         if self.at_stamps:
             own = self.fast.inputs.drive(recording) if self.is_network else None
-            return drive_of_recording(self.fast.spec, recording) if own is None else own
+            return drive_of_recording(self.fast.spec, recording, widths=FITTED) if own is None else own
         if self.is_network:
             drive = even_drive(self.fast, recording)
         else:

@@ -23,6 +23,7 @@ from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.model.lumped.written_network import build_network, value_in_definition
 from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
+from spindle_fem.model.reduced.drive import drive_of_recording
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for, options_for, recentred_model
 from spindle_fem.operation.bearing_heat import at_assembly_size
@@ -115,19 +116,20 @@ def _simulate_geometry(
         told = [with_displacements(item) for item in calibration]
         earlier = Predictor(fast, told, effects=effects, at_stamps=True)
         result = fit_parameters(earlier, progress=progress)
-    predictor = Predictor(fast, [recording], effects=effects, at_stamps=True)
+    drives = (drive_of_recording(spec, recording),)
+    predictor = Predictor(fast, [recording], effects=effects, at_stamps=True, drives=drives)
     factors = {} if result is None else result.factors
     if result is not None and followed.follows_preload:
         # a calibrated machine goes elsewhere
         fast, error = with_followed_preload(
             followed, assembled, (recording,), effects, factors, progress=progress
         )
-        predictor = Predictor(fast, [recording], effects=effects, at_stamps=True)
+        predictor = Predictor(fast, [recording], effects=effects, at_stamps=True, drives=drives)
     outside = _outside_range(predictor, factors)
     if outside:
         progress("reduced model: outside its range, made anew")
         fast = recentred_model(fast, factors, options_for(spec, recordings), progress)
-        predictor = Predictor(fast, [recording], effects=effects, at_stamps=True)
+        predictor = Predictor(fast, [recording], effects=effects, at_stamps=True, drives=drives)
         outside = _outside_range(predictor, factors)
     progress("simulation")
     predicted, half_width = _prediction(predictor, result)
@@ -185,7 +187,9 @@ def _displacements(predictor: Predictor, factors: Mapping[str, float]) -> Array:
         flags=np.isnan(read).astype(np.uint8),
         sigma=np.ones(read.shape[1]),
     )
-    growing = Predictor(predictor.fast, [seen], effects=predictor.effects, at_stamps=True)
+    growing = Predictor(
+        predictor.fast, [seen], effects=predictor.effects, at_stamps=True, drives=predictor.drives
+    )
     found = 1e-6 * growing.predict(0, factors, (), ()).temperature
     first = np.argmax(np.isfinite(read), axis=0)
     return found - found[first, np.arange(len(first))]

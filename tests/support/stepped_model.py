@@ -12,10 +12,17 @@ needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C co
 
 
 def inputs_of(model, drive):
-    """Inputs at both ends of every step in the model's order and units, (G, m) each."""
-    offsets = [ZERO_CELSIUS_K if item["unit"] == "degC" else 0.0 for item in model.header["inputs"]]
-    columns = [drive.column(name) for name in model.inputs]
-    return drive.start[:, columns] - offsets, drive.end[:, columns] - offsets
+    """Inputs at both ends of every step in the model's order and units, (G, m) each, usual where unknown."""
+    found = []
+    for values in (drive.start, drive.end):
+        columns = [
+            values[:, drive.column(item["name"])] - ZERO_CELSIUS_K * (item["unit"] == "degC")
+            if item["name"] in drive.names
+            else np.full(len(values), item["default"])
+            for item in model.header["inputs"]
+        ]
+        found.append(np.column_stack(columns))
+    return found
 
 
 def readings_along(model, drive, given, most_steps=None):

@@ -26,6 +26,7 @@ from tests.support.stepped_model import c_readings_along, needs_compiler, readin
 # Largest difference from simulate, K.
 AGREEMENT = 1e-3
 START = 22.0
+TIMES = np.arange(0.0, 7200.0, 30.0)
 
 
 @pytest.fixture(scope="module")
@@ -35,15 +36,14 @@ def space(fast):
 
 def driven(**changes):
     """Speed, standstill and another flow, with thrust, air and inlet that move."""
-    times = np.arange(0.0, 7200.0, 30.0)
-    speed = np.where(times < 3000.0, 3000.0, np.where(times < 5000.0, 0.0, 1234.0))
+    speed = np.where(TIMES < 3000.0, 3000.0, np.where(TIMES < 5000.0, 0.0, 1234.0))
     inputs = {
-        "ambient": 293.15 + np.sin(times / 1000.0),
-        "inlet": 290.15 + np.cos(times / 700.0),
-        "thrust": 1000.0 + 0.1 * times,
-        "flow": np.where(times < 4000.0, 20.0, 14.0) / 60e3,
+        "ambient": 293.15 + np.sin(TIMES / 1000.0),
+        "inlet": 290.15 + np.cos(TIMES / 700.0),
+        "thrust": 1000.0 + 0.1 * TIMES,
+        "flow": np.where(TIMES < 4000.0, 20.0, 14.0) / 60e3,
     }
-    return drive_of(times, speed, **inputs | changes)
+    return drive_of(TIMES, speed, **inputs | changes)
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +113,16 @@ def turning():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("litres", "inlet"), [(5.7, 294.15), (6.5, 287.15), (4.0, 297.15)])
+@pytest.mark.parametrize(
+    ("litres", "inlet"),
+    [
+        (5.7, 294.15),
+        (6.5, 287.15),
+        (4.0, 297.15),
+        (5.0 + np.sin(TIMES / 1100.0), 290.15 + np.cos(TIMES / 700.0)),
+    ],
+    ids=["near", "cold", "slow", "back_and_forth"],
+)
 def test_a_film_that_turns_turbulent_over_flow_and_inlet_is_that_of_simulate(turning, litres, inlet):
     model = agrees(turning, driven(flow=litres / 60e3, inlet=inlet))
     # the films bend at one Reynolds number, along no line of flow or inlet

@@ -20,17 +20,38 @@ from spindle_fem.recordings.standard_inputs import standard_inputs
 
 Array = NDArray[np.float64]
 
-# Sensitivity of the channel's film at constant Nusselt number: 0.02 % per kelvin and 0.3 % per per cent.
-# Where it follows viscosity, about 1 % per kelvin.
-INLET_BIN = 0.25
-FLOW_BIN = 0.01
-SPEED_BIN = 2.0e-3
-MOST_CLASSES = 120
 # Walls of the channel whose mean differs by less share a film where films follow the wall, K; that many
 # classes more at most.
 WALL_BIN, MOST_WALLS = 0.25, 200
 LARGEST_STEP = 60.0
 MOST_STEP_SIZES = 200
+
+
+@dataclass(frozen=True, slots=True)
+class ClassWidths:
+    """How far inputs may differ between steps that share their films.
+
+    Attributes
+    ----------
+    inlet : float, [K]
+        Films follow viscosity by about 1 % per kelvin.
+    flow, speed : float
+        Shares of the highest; a film at constant Nusselt number follows flow by 0.3 % per per cent, one that
+        turns turbulent by 3 %.
+    most : int
+        Classes; widths grow where inputs take more values.
+    """
+
+    inlet: float
+    flow: float
+    speed: float
+    most: int
+
+
+# Readings within a millikelvin of those with a film for each step.
+PREDICTED = ClassWidths(0.01, 3.0e-4, 1.0e-4, 400)
+# For fits, which march many times: some 0.1 mK, up to 25 mK for minutes where the coolant turns turbulent.
+FITTED = ClassWidths(0.25, 0.01, 2.0e-3, 120)
 
 STANDARD = ("speed", "thrust", "ambient", "coolant_inlet", "coolant_flow")
 
@@ -97,7 +118,11 @@ class Drive:
 
 
 def drive_of_recording(
-    spec: MachineSpec, recording: Recording, *, largest_step: float = LARGEST_STEP
+    spec: MachineSpec,
+    recording: Recording,
+    *,
+    largest_step: float = LARGEST_STEP,
+    widths: ClassWidths = PREDICTED,
 ) -> Drive:
     """Inputs of a recording on the steps of its own grid.
 
@@ -142,6 +167,7 @@ def drive_of_recording(
         np.array(held),
         notes=(*notes, *unusual),
         largest_step=largest_step,
+        widths=widths,
     )
 
 
@@ -153,6 +179,7 @@ def make_drive(
     *,
     notes: tuple[str, ...] = (),
     largest_step: float = LARGEST_STEP,
+    widths: ClassWidths = PREDICTED,
 ) -> Drive:
     """Inputs on steps no longer than allowed, sorted into classes.
 
@@ -170,7 +197,7 @@ def make_drive(
         raise RecordingError("inputs", f"named {names}.", f"Allowed: {STANDARD} first.")
     grid, start, end = inputs_on_steps(np.asarray(times, dtype=float), values, held, largest_step)
     level_covariates(names, start, end)
-    step_class, points = classes_of(0.5 * (start + end))
+    step_class, points = classes_of(0.5 * (start + end), widths)
     return Drive(np.asarray(times, dtype=float), grid, names, start, end, step_class, points, notes)
 
 
@@ -235,14 +262,12 @@ def _grid(times: Array, held: Array, largest: float, breaks: Array) -> Array:
     return np.append(np.concatenate(parts), times[-1])
 
 
-def classes_of(
-    inputs: Array, inlet_bin: float = INLET_BIN, speed_bin: float = SPEED_BIN
-) -> tuple[NDArray[np.int64], tuple[OperatingPoint, ...]]:
+def classes_of(inputs: Array, widths: ClassWidths) -> tuple[NDArray[np.int64], tuple[OperatingPoint, ...]]:
     """Steps whose films differ too little to matter share one operator."""
     speed, thrust, ambient, inlet, flow = inputs[:, : len(STANDARD)].T
-    width = speed_bin * max(float(speed.max()), 1.0)
-    flow_width = FLOW_BIN * max(float(flow.max()), 1e-9)
-    inlet_width = inlet_bin
+    width = widths.speed * max(float(speed.max()), 1.0)
+    flow_width = widths.flow * max(float(flow.max()), 1e-9)
+    inlet_width = widths.inlet
     while True:
         keys = np.column_stack(
             (np.round(speed / width), np.round(inlet / inlet_width), np.round(flow / flow_width))
@@ -251,7 +276,7 @@ def classes_of(
         keys[speed == 0.0, 0] = -1.0
         _, label = np.unique(keys, axis=0, return_inverse=True)
         label = label.reshape(-1)
-        if label.max() < MOST_CLASSES:
+        if label.max() < widths.most:
             break
         width, inlet_width, flow_width = 1.5 * width, 1.5 * inlet_width, 1.5 * flow_width
     means = [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -21,7 +20,15 @@ from spindle_fem.recordings.standard_inputs import standard_inputs
 from spindle_fem.studies.export.effect_export import ExportedEffects
 from spindle_fem.studies.export.feedback_export import FeedbackTable
 from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
-from spindle_fem.studies.export.operator_tables import PARTS, OperatorTable
+from spindle_fem.studies.export.operator_tables import (
+    OperatorTable,
+    directions_of,
+    equal_weights,
+    in_a_row,
+    operator_parts,
+    operator_shapes,
+    sampled_table,
+)
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
@@ -29,12 +36,8 @@ Array = NDArray[np.float64]
 # Relative error of films and coefficients between the points of a table; this many times that of friction,
 # which warms the coolant by tenths of a kelvin, and over scaled flows, which reach further.
 TOLERANCE, OF_FRICTION, OF_SCALED = 5e-5, 10.0, 2.0
-# Directions of the coolant's operators are left out below this relative variation.
-LEFT_OUT = 1e-7
-# Rounding error of squares of samples, relative.
-ROUND_OFF = 1e-15
-# Points of the coolant's table; samples that its directions are taken from.
-MOST_POINTS, MOST_SAMPLES = 5000, 300
+# Points of the coolant's table.
+MOST_POINTS = 5000
 # Mean rises of the channel's wall above the inlet, K: where films are worked out, and points of the table.
 RISES, RISE_AXIS = np.linspace(-15.0, 30.0, 10), np.linspace(-15.0, 30.0, 46)
 # The wall changes the film only a little: fewer flows and directions suffice.
@@ -203,35 +206,18 @@ class CoolantOperators:
         known = coolant.lowest_temperature, coolant.highest_temperature
         return WarmedPoint(**own, channel_wall=np.clip(wall, *known))
 
-    def _shapes(self) -> tuple[tuple[int, int], ...]:
-        size, n_load, n_out = self.fast.model.size, len(self.fast.load_names), len(self.fast.channels)
-        return (size, size), (size, n_load), (n_out, size), (n_out, n_load)
-
     def sample(self, flow: float, inlet: float, rise: float | None = None) -> Array:
         """Everything that the coolant adds, as :data:`PARTS` one behind the other."""
         fast = self.fast
         driven, friction = (fast.load_names.index(name) for name in ("coolant_inlet", "coolant_friction"))
         outlets = [row for row, probe in enumerate(fast.spec.probe) if probe.kind == "coolant_outlet"][:1]
         maps = coolant_maps(fast.model, *self.film(flow, inlet, rise))
-        conduction, load, output, feedthrough = (np.zeros(shape) for shape in self._shapes())
+        conduction, load, output, feedthrough = (np.zeros(shape) for shape in operator_shapes(fast))
         conduction += maps.conduction
         load[:, driven], load[:, friction] = maps.inlet_load, maps.constant_load
         output[outlets], feedthrough[outlets, driven] = maps.outlet, maps.outlet_inlet
         feedthrough[outlets, friction] = maps.outlet_constant
-        return np.concatenate([part.ravel() for part in (conduction, load, output, feedthrough)])
-
-    def parts(self, rows: Array) -> dict[str, Array]:
-        """Matrices (m, ., .) by part of rows as :meth:`sample` has them."""
-        shapes = self._shapes()
-        ends = np.cumsum([np.prod(shape) for shape in shapes])
-        split = np.split(rows, ends[:-1], axis=1)
-        return {part: own.reshape(-1, *shape) for part, own, shape in zip(PARTS, split, shapes, strict=True)}
-
-    def scale(self, row: Array) -> Array:
-        """Divisors of a sample's entries that give heats, loads and temperatures equal weight."""
-        ends = np.cumsum([np.prod(shape) for shape in self._shapes()])
-        split = np.split(row, ends[:-1])
-        return np.concatenate([np.full(part.shape, np.linalg.norm(part) or 1.0) for part in split])
+        return in_a_row((conduction, load, output, feedthrough))
 
     def axes(
         self, flows: tuple[float, float], inlets: tuple[float, float], tolerance: float = TOLERANCE
@@ -276,25 +262,9 @@ def coolant_table(coolant: CoolantOperators, axes: tuple[Array, Array]) -> Opera
     """Coolant operators over flow and inlet temperature, on the few directions in which they vary."""
     nominal = coolant.nominal
     base = coolant.sample(nominal.coolant_flow, nominal.coolant_inlet_temperature - ZERO_CELSIUS_K)
-    scale = coolant.scale(base)
-    places = list(product(*axes))
-    basis, weights = _directions(lambda place: (coolant.sample(*place) - base) / scale, places, LEFT_OUT)
-    values = weights.reshape(*(axis.size for axis in axes), -1)
-    return OperatorTable(coolant.table_inputs, axes, values, coolant.parts(basis * scale))
-
-
-def _directions(
-    sample: Callable[[tuple[float, ...]], Array], places: list[tuple[float, ...]], left_out: float
-) -> tuple[Array, Array]:
-    """Orthonormal directions (m, n) of samples (n,) at places, and each place's coordinates along them."""
-    every = max(1, -(-len(places) // MOST_SAMPLES))
-    chosen = np.array([sample(place) for place in places[::every]])
-    squares, vectors = np.linalg.eigh(chosen @ chosen.T)
-    kept = squares > max(left_out**2 * len(chosen), ROUND_OFF * squares[-1])
-    basis = (vectors[:, kept].T @ chosen) / np.sqrt(squares[kept])[:, None]
-    if every == 1:
-        return basis, chosen @ basis.T
-    return basis, np.array([basis @ sample(place) for place in places])
+    return sampled_table(
+        coolant.fast, coolant.table_inputs, axes, lambda *place: coolant.sample(*place) - base, base
+    )
 
 
 def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> FeedbackTable | None:
@@ -311,19 +281,19 @@ def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> Feedb
     """
     fast, wall, nominal = coolant.fast, coolant.wall, coolant.nominal
     usual = coolant.sample(nominal.coolant_flow, nominal.coolant_inlet_temperature - ZERO_CELSIUS_K)
-    scale = coolant.scale(usual)
+    scale = equal_weights(fast, usual)
     at_usual = {place: coolant.sample(*place) for place in product(*axes)}
 
     def change(place: tuple[float, ...]) -> Array:
         rise, *driven = place
         return (coolant.sample(*driven, rise) - at_usual[tuple(driven)]) / scale
 
-    basis, weights = _directions(change, list(product(RISES, *axes)), WALL_LEFT_OUT)
+    basis, weights = directions_of(change, list(product(RISES, *axes)), WALL_LEFT_OUT)
     if not len(basis):
         return None
     coarse = weights.reshape(RISES.size, *(axis.size for axis in axes), -1)
     values = PchipInterpolator(RISES, coarse)(RISE_AXIS)
-    parts = coolant.parts(basis * scale)
+    parts = operator_parts(fast, basis * scale)
     loads = [fast.load_names.index(name) for name in ("coolant_inlet", "coolant_friction")]
     size = fast.model.size
     column, out, into, load, read = [], [], [], [], []
@@ -335,7 +305,7 @@ def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> Feedb
         load.append({fast.load_names[k]: float(v) for k, v in zip(loads, weighted[size:], strict=True)})
         read.append(shown)
 
-    heat = coolant.parts(usual[None])
+    heat = operator_parts(fast, usual[None])
     least = WALL_LEFT_OUT * np.linalg.norm(heat["conduction"])
     largest = np.abs(weights).max(axis=0)
     for direction in range(len(basis)):

@@ -27,7 +27,7 @@ from spindle_fem.studies.export.feedback_export import (
     feedback_tables,
     film_heat_of,
 )
-from spindle_fem.studies.export.operator_tables import PARTS, changes_at, speed_table
+from spindle_fem.studies.export.operator_tables import PARTS, changes_at, circuit_table, speed_table
 from spindle_fem.studies.export.source_export import source_loads
 from spindle_fem.studies.export.state_space import (
     CELSIUS,
@@ -93,6 +93,8 @@ def _state_space(
     inputs += sources.inputs
     position = {item.name: number for number, item in enumerate(inputs)}
     tables = {"speed": speed_table(fast, effects, nominal, highest_speed)}
+    circuits = circuit_table(fast, effects, nominal, highest_speed)
+    tables |= {} if circuits is None else {"circuits": circuits}
     coolant = CoolantOperators(fast, effects, nominal, wall)
     if fast.channel is not None:
         ends = _flow_range(nominal), _inlet_range(spec)
