@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import gzip
-import importlib
 import io
 import itertools
 import re
@@ -71,7 +70,7 @@ def read_measurement(path: Path) -> MeasurementTable:
     Raises
     ------
     RecordingError
-        The file cannot be read, is of no known kind, its reader is not installed, or it holds no table.
+        The file cannot be read, is of no known kind, or it holds no table.
     """
     name = path.name.lower()
     if not path.is_file():
@@ -98,7 +97,6 @@ def _read_binary(path: Path, name: str) -> pd.DataFrame:
         return frame if isinstance(frame.index, pd.RangeIndex) else frame.reset_index()
     if name.endswith(HDF5_SUFFIXES):
         return _read_hdf5(path)
-    _require("nptdms", path)
     from nptdms import TdmsFile
 
     columns = {}
@@ -114,21 +112,28 @@ def _read_binary(path: Path, name: str) -> pd.DataFrame:
 def _read_hdf5(path: Path) -> pd.DataFrame:
     import h5py
 
-    columns: dict[str, np.ndarray] = {}
+    found: list[tuple[str, str, np.ndarray]] = []
 
     def add(name: str, item: object) -> None:
         if not isinstance(item, h5py.Dataset) or item.ndim != 1:
             return
         values = item[:]
         if values.dtype.names:
-            columns.update({field: values[field] for field in values.dtype.names})
+            found.extend((field, "", values[field]) for field in values.dtype.names)
             return
         unit = item.attrs.get("units", item.attrs.get("unit", ""))
-        unit = unit.decode() if isinstance(unit, bytes) else str(unit)
-        columns[f"{name} [{unit}]" if unit else name] = values
+        found.append((name, unit.decode() if isinstance(unit, bytes) else str(unit), values))
 
     with h5py.File(path, "r") as file:
         file.visititems(add)
+    # Without their groups where no two are alike then.
+    names = [name.rpartition("/")[2] for name, _, _ in found]
+    if len(set(names)) < len(names):
+        names = [name for name, _, _ in found]
+    columns = {
+        f"{name} [{unit}]" if unit else name: values
+        for name, (_, unit, values) in zip(names, found, strict=True)
+    }
     columns = {
         name: np.array([cell.decode("utf-8", "replace") for cell in values])
         if values.dtype.kind in "SO" and len(values) and isinstance(values[0], bytes)
@@ -153,19 +158,7 @@ def _of_most_common_length(path: Path, columns: dict[str, np.ndarray]) -> pd.Dat
     return pd.DataFrame({name: values for name, values in columns.items() if len(values) == usual})
 
 
-def _require(module: str, path: Path) -> None:
-    try:
-        importlib.import_module(module)
-    except ImportError as error:
-        raise RecordingError(
-            str(path),
-            f"needs the package {module}, which is not installed.",
-            'Install it with: pip install "spindle-fem[files]", or save the file as CSV.',
-        ) from error
-
-
 def _read_excel(path: Path) -> MeasurementTable:
-    _require("openpyxl", path)
     try:
         sheets = pd.read_excel(path, sheet_name=None, header=None, engine="openpyxl", dtype=object)
     except Exception as error:  # openpyxl lets through whatever zip, XML and its own checks raise

@@ -3,9 +3,12 @@
 import os
 from pathlib import Path
 
+import h5py
 import numpy as np
+import openpyxl
 import pandas as pd
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 
 from spindle_fem.commands.diagnose_command import diagnose_without_report
 from spindle_fem.recordings.align import read_recording
@@ -64,7 +67,7 @@ def utf16_tsv(path, name):
 
 def excel(path, name):
     """A sheet with a title, dates as Excel has them, a row of units."""
-    workbook = pytest.importorskip("openpyxl").Workbook()
+    workbook = openpyxl.Workbook()
     stamps, values, _ = table(name)
     sheet = workbook.active
     for row in (["Messung Spindel"], [], ["Zeitstempel", *values], ["", *UNITS]):
@@ -74,7 +77,49 @@ def excel(path, name):
     workbook.save(path)
 
 
-FORMS = {"german.csv": german_csv, "export.tsv": utf16_tsv, "messung.xlsx": excel}
+def parquet(path, name):
+    """Stamps as the index, units beside the names."""
+    stamps, values, _ = table(name)
+    values.columns = [f"{column} [{unit}]" for column, unit in zip(values, UNITS, strict=True)]
+    values.set_index(pd.DatetimeIndex(stamps, name="Zeit")).to_parquet(path)
+
+
+def hdf5(path, name):
+    """A group with seconds and columns, units as attributes."""
+    stamps, values, _ = table(name)
+    with h5py.File(path, "w") as file:
+        group = file.create_group("Messung")
+        for column, unit, cells in _columns(stamps, values):
+            group.create_dataset(column, data=cells).attrs["unit"] = unit
+
+
+def tdms(path, name):
+    """A group with seconds and channels, units as their properties."""
+    stamps, values, _ = table(name)
+    with TdmsWriter(path) as writer:
+        writer.write_segment(
+            [
+                ChannelObject("Messung", column, cells, {"unit_string": unit})
+                for column, unit, cells in _columns(stamps, values)
+            ]
+        )
+
+
+def _columns(stamps, values):
+    """Name, unit and cells of the seconds and of every column."""
+    yield "time", "s", (stamps - stamps.iloc[0]).dt.total_seconds().to_numpy()
+    for column, unit in zip(values, UNITS, strict=True):
+        yield column, unit, values[column].to_numpy()
+
+
+FORMS = {
+    "german.csv": german_csv,
+    "export.tsv": utf16_tsv,
+    "messung.xlsx": excel,
+    "messung.parquet": parquet,
+    "messung.h5": hdf5,
+    "messung.tdms": tdms,
+}
 
 
 def drafted(folder, form, name="recording"):
@@ -90,14 +135,16 @@ def drafted(folder, form, name="recording"):
 @pytest.mark.parametrize("form", FORMS)
 def test_what_was_exported_is_read_as_the_original(form, tmp_path):
     told, found = read_recording(CASE), read_recording(drafted(tmp_path, form))
-    assert found.probes == told.probes
-    assert found.input_names == told.input_names
-    assert np.array_equal(found.held, told.held)
+    # HDF5 has columns by name
+    probes = [found.probes.index(name) for name in told.probes]
+    inputs = [found.input_names.index(name) for name in told.input_names]
+    assert (len(found.probes), len(found.input_names)) == (len(probes), len(inputs))
+    assert np.array_equal(found.held[inputs], told.held)
     assert found.covariate_names == ()
     np.testing.assert_allclose(found.times, told.times, atol=1e-3)
-    np.testing.assert_allclose(found.temperature, told.temperature, atol=2e-6)
-    np.testing.assert_allclose(found.inputs, told.inputs, rtol=1e-6, atol=1e-9)
-    assert np.array_equal(found.flags, told.flags)
+    np.testing.assert_allclose(found.temperature[:, probes], told.temperature, atol=2e-6)
+    np.testing.assert_allclose(found.inputs[:, inputs], told.inputs, rtol=1e-6, atol=1e-9)
+    assert np.array_equal(found.flags[:, probes], told.flags)
 
 
 @pytest.mark.slow
