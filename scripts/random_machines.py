@@ -36,6 +36,8 @@ LAYOUTS = ("pairs", "triplex", "unlike", "grooves", "rollers")
 COOLINGS = ("none", "helix", "two helices", "bore", "annulus", "helix and bore")
 DRIVES = ("motor", "belt", "coupling")
 FLUIDS = ("water", "ethylene_glycol_30", "ethylene_glycol_50", "iso_vg_10", "iso_vg_32", "iso_vg_46")
+# Checks that a machine fails by what it is, not by how it is solved.
+TOO_HOT = {"grease temperature", "oil temperature"}
 # Fast enough for hundreds, fine enough for every face: linear elements on a coarse mesh.
 MESH = ("mesh.preset=coarse", "mesh.order=1", "mesh.size_factor=1.6")
 _CODES = (6, 8, 10, 12, 14, 16, 18, 20)
@@ -292,8 +294,8 @@ def _helix(
 def solve_machine(content: dict[str, Any], file: Path, *, meshed: bool = True) -> tuple[str, str]:
     """Outcome of a machine: ``solved``, ``refused``, ``unsettled`` or ``failed``, and why or how warm.
 
-    Refused: ruled out by definition, geometry or bearings, by name; unsettled: no steady state by elements or
-    network; anything else is a failure.
+    Refused: ruled out by definition, geometry, bearings or a lubricant's limit, by name; unsettled: no steady
+    state by elements or network; anything else is a failure.
     """
     file.write_text(tomli_w.dumps(content), encoding="utf-8")
     try:
@@ -315,9 +317,11 @@ def solve_machine(content: dict[str, Any], file: Path, *, meshed: bool = True) -
     network = state.bearing_temperatures()
     if result is None:
         return "solved", f"{max(item.ball for item in network.values()) - 273.15:.0f} °C"
-    broken = [check.name for check in result.checks if not check.passed]
+    broken = {check.name: f"{check.value:.4g} {check.unit}" for check in result.checks if not check.passed}
     if broken:
-        return "failed", f"checks: {', '.join(broken)}"
+        named = ", ".join(f"{name} {value}" for name, value in broken.items())
+        # too hot for its lubricant: what the machine is, not what the solver does
+        return "refused" if broken.keys() <= TOO_HOT else "failed", f"checks: {named}"
     apart = max(abs(network[name].outer - item.temperature_outer) for name, item in result.bearings.items())
     warm = max(item.temperature_ball for item in result.bearings.values()) - 273.15
     return "solved", f"{warm:.0f} °C, network {apart:.1f} K apart"

@@ -55,7 +55,8 @@ def check_coldest(coldest_inside: float, coldest_outside: float) -> Check:
         max(0.0, coldest_outside - coldest_inside),
         BELOW_COLDEST_LIMIT,
         "K",
-        f"Coldest surroundings {coldest_outside - ZERO_CELSIUS_K:.2f} °C.",
+        f"Coldest surroundings {coldest_outside - ZERO_CELSIUS_K:.2f} °C. Elements are too large for the "
+        "steepest film: mesh.order = 2, or a smaller mesh.size_factor.",
     )
 
 
