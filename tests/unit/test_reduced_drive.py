@@ -6,7 +6,7 @@ import pytest
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import RecordingError
 from spindle_fem.model.reduced.drive import (
-    MOST_CLASSES,
+    PREDICTED,
     STANDARD,
     WALL_BIN,
     inputs_at,
@@ -57,7 +57,7 @@ def test_a_noisy_speed_makes_no_more_classes_than_allowed():
     rng = np.random.default_rng(0)
     times = np.arange(3000) * 1.0
     drive = make_drive(times, STANDARD, inputs(times, 300.0 * rng.random(3000)), HELD)
-    assert len(drive.points) <= MOST_CLASSES
+    assert len(drive.points) <= PREDICTED.most
 
 
 def test_jittering_stamps_get_equal_steps_between_changes_of_held_inputs():
