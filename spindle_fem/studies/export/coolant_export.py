@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -134,6 +134,10 @@ class CoolantOperators:
     nominal: OperatingPoint
     wall: WallRise | None
     scaling: FlowScale | None = None
+    # Films by flow, inlet and rise: axes, their check and operators ask for the same ones.
+    _known: dict[tuple[float, float, float | None], tuple[Array, float, float]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def over(
         self, flows: tuple[float, float], inlets: tuple[float, float]
@@ -191,6 +195,12 @@ class CoolantOperators:
 
     def film(self, flow: float, inlet: float, rise: float | None = None) -> tuple[Array, float, float]:
         """Film of each cell, capacity rate and friction heat at a flow [m³/s], inlet [°C], mean rise [K]."""
+        key = flow, inlet, rise
+        if key not in self._known:
+            self._known[key] = self._film(*key)
+        return self._known[key]
+
+    def _film(self, flow: float, inlet: float, rise: float | None) -> tuple[Array, float, float]:
         flow = flow if self.scaling is None else flow / self.scaling.at(inlet)
         point = replace(self.nominal, coolant_flow=flow, coolant_inlet_temperature=inlet + ZERO_CELSIUS_K)
         if self.wall is not None:
