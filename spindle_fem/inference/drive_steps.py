@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.inference.recording_gaps import GAP_STEPS, long_spacings
+from spindle_fem.inference.recording_gaps import long_spacings
 from spindle_fem.model.reduced.drive import (
     ClassWidths,
     Drive,
@@ -17,7 +17,7 @@ from spindle_fem.model.reduced.drive import (
     drive_of_recording,
 )
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.align import GAP_STEPS, Recording
 
 Array = NDArray[np.float64]
 

@@ -14,22 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.inference import tuned
 from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import TransientRun
-from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.align import GAP_STEPS, Recording
 
 Array = NDArray[np.float64]
 
-# A distance of stamps above this many usual ones is a gap.
-GAP_STEPS = 1.5
-# Shorter gaps [s] and smaller changes of an input temperature over one [K] move no reading by its noise.
-SHORTEST_GAP, LEAST_CHANGE = 120.0, 1.0
-# Length of a piece [s], and the most pieces of one gap: each is a further coordinate of every fit.
-GAP_PIECE, MOST_PIECES = 150.0, 8
-# A held input that is another in a row changed at any time since the row before it. Rows nearer than this [s]
-# leave nothing open that readings show, and of many changes the largest are left open.
-LEAST_SPACING, MOST_JUMPS, MOST_BETWEEN = 15.0, 60, 20
 # Input temperatures, by the name of their load.
 WARMTH = ("ambient", "coolant_inlet")
 
@@ -37,11 +29,13 @@ WARMTH = ("ambient", "coolant_inlet")
 def gap_pieces(recording: Recording) -> tuple[tuple[float, float], ...]:
     """Gaps long enough for something to have happened in them, in pieces of some minutes, [s]."""
     spacing = np.diff(recording.times)
-    rows = np.flatnonzero((spacing > GAP_STEPS * np.median(spacing)) & (spacing >= SHORTEST_GAP))
+    rows = np.flatnonzero((spacing > GAP_STEPS * np.median(spacing)) & (spacing >= tuned.SHORTEST_GAP))
     found = []
     for row in rows:
         first, last = recording.times[row : row + 2]
-        edges = np.linspace(first, last, 1 + min(MOST_PIECES, int(np.ceil((last - first) / GAP_PIECE))))
+        edges = np.linspace(
+            first, last, 1 + min(tuned.MOST_PIECES, int(np.ceil((last - first) / tuned.GAP_PIECE)))
+        )
         found += [(float(a), float(b)) for a, b in itertools.pairwise(edges)]
     return tuple(found)
 
@@ -117,7 +111,7 @@ def hidden_in(
         for begin, end in pieces:
             row = int(np.searchsorted(recording.times, begin + 1e-6))
             before, after = recording.input_at(name, recording.times[row - 1 : row + 1])
-            if abs(after - before) >= LEAST_CHANGE:
+            if abs(after - before) >= tuned.LEAST_CHANGE:
                 found.append(Hidden(begin, end, name, float(after - before)))
         found += _between_rows(recording, name)
     return tuple(found)
@@ -127,9 +121,9 @@ def _between_rows(recording: Recording, name: str) -> list[Hidden]:
     """Where an input temperature changes much from row to row it need not have gone along a straight line."""
     spacing = np.diff(recording.times)
     change = np.diff(recording.input_at(name, recording.times))
-    near = (spacing >= LEAST_SPACING) & (spacing <= GAP_STEPS * np.median(spacing))
-    rows = np.flatnonzero(near & (np.abs(change) >= LEAST_CHANGE))
-    largest = np.sort(rows[np.argsort(-np.abs(change[rows]))[:MOST_BETWEEN]])
+    near = (spacing >= tuned.LEAST_SPACING) & (spacing <= GAP_STEPS * np.median(spacing))
+    rows = np.flatnonzero(near & (np.abs(change) >= tuned.LEAST_CHANGE))
+    largest = np.sort(rows[np.argsort(-np.abs(change[rows]))[: tuned.MOST_BETWEEN]])
     return [
         Hidden(float(recording.times[row]), float(recording.times[row + 1]), name, float(change[row]))
         for row in largest
@@ -157,11 +151,11 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
             continue
         first, last = recording.times[row - 1], recording.times[row]
         in_gap = last - first > GAP_STEPS * usual
-        if in_gap or last - first >= LEAST_SPACING:
+        if in_gap or last - first >= tuned.LEAST_SPACING:
             change = np.abs(drive.start[step] - drive.end[step - 1]) / np.maximum(largest, 1e-9)
             size = np.inf if in_gap else float(change.max())
             found.append((size, (int(step), float(time - last), float(time - first))))
-    chosen = sorted(found, key=lambda item: -item[0])[:MOST_JUMPS]
+    chosen = sorted(found, key=lambda item: -item[0])[: tuned.MOST_JUMPS]
     return tuple(sorted(item for _, item in chosen))
 
 

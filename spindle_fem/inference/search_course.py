@@ -12,7 +12,7 @@ from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search
 from spindle_fem.inference.neighbouring_sets import exchanged, reduced, widened
-from spindle_fem.inference.state_search import WORTH_ANOTHER, add_states, settle_best, simulated
+from spindle_fem.inference.state_search import add_states, settle_best, simulated
 from spindle_fem.inference.step_search import add_steps
 
 
@@ -100,7 +100,7 @@ def _beside(search: Search) -> None:
         search.extend(best.fit, screened, intervals, 1, tuned.ADDITIONS)
         settle_best(search)
         again = search.ranked()[0]
-        if again.score <= best.score + WORTH_ANOTHER:
+        if again.score <= best.score + tuned.WORTH_ANOTHER:
             # A state that is followed again gains a little every time.
             return
         best = again

@@ -30,10 +30,6 @@ from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.missing_heat import Pattern
 from spindle_fem.inference.switching_model import QUICK, THOROUGH, Chain, Course, ReadingFilter, find_course
 
-# Places whose courses are settled, and rounds of course and fit in turn.
-PLACES_SETTLED, ROUNDS = 2, 4
-# Gain of a round from which another one follows (natural logarithm).
-WORTH_ANOTHER = 2.0
 # Shares of the usual size from which courses are looked for.
 START_SIZES = (0.3, 1.5)
 # Fewer intervals than this are single events, whose edges are free.
@@ -61,7 +57,7 @@ def state_places(search: Search) -> list[StatePlace]:
     ]
 
 
-def add_states(search: Search, fit: Fit, number: int = PLACES_SETTLED) -> None:
+def add_states(search: Search, fit: Fit, number: int = tuned.STATE_PLACES) -> None:
     """Fit the sets with a state beside what a fit holds, at the most promising places."""
     if any(search.in_intervals(c) for c in fit.candidates):
         return
@@ -268,7 +264,7 @@ def settle(
     problem = search.problem
     rest, values = (fit.candidates, dict(fit.values)) if left_out is None else without(fit, left_out)
     best: Hypothesis | None = None
-    for _ in range(ROUNDS):
+    for _ in range(tuned.COURSE_ROUNDS):
         grid = problem.predictor.drives[place.recording].grid
         intervals = intervals_of(course.on, grid)
         if len(intervals) < FEWEST:
@@ -284,7 +280,7 @@ def settle(
         search.courses[candidate.amplitude] = place, course, paid / (course.log_evidence + course.log_choice)
         hypothesis = search.hypothesis(fitted)
         better = best is None or hypothesis.score > best.score
-        enough = best is not None and hypothesis.score < best.score + WORTH_ANOTHER
+        enough = best is not None and hypothesis.score < best.score + tuned.WORTH_ANOTHER
         if better:
             best = hypothesis
         elif known is not None:

@@ -34,12 +34,6 @@ from spindle_fem.inference.prepared_problem import slow_error_of
 
 Array = NDArray[np.float64]
 
-# Rounds of segmentation and fit, and places that get them.
-ROUNDS, PLACES_SETTLED = 4, 3
-# Gain of a round from which another one follows (natural logarithm).
-WORTH_ANOTHER = 2.0
-# Misfit beyond that of a course of levels from which one with a change less is not followed to its optimum.
-HOPELESS = 60.0
 # Changes of a course that are tried without, the least ones: each takes a fit.
 CHANGES_TRIED = 3
 
@@ -96,7 +90,7 @@ def add_steps(search: Search, fit: Fit) -> None:
         kinds.setdefault((item[1].name, bool(item[2].pattern.source)), item)
     first = list(kinds.values())
     others = [item for item in fair if all(item is not chosen for chosen in first)]
-    for _, effect, onsets in [*first, *others][:PLACES_SETTLED]:
+    for _, effect, onsets in [*first, *others][: tuned.STEP_PLACES]:
         _settle(search, fit, effect, onsets)
 
 
@@ -111,7 +105,7 @@ def _settle(search: Search, fit: Fit, effect: IntervalEffect, onsets: Onsets) ->
     stop = float(problem.predictor.drives[onsets.recording].grid[-1])
     spread = _spread(search, effect, onsets.pattern)
     values, best = dict(fit.values), None
-    for _ in range(ROUNDS):
+    for _ in range(tuned.COURSE_ROUNDS):
         changes = find_changes(onsets.gram, onsets.data, spread)
         if changes is None:
             break
@@ -127,7 +121,7 @@ def _settle(search: Search, fit: Fit, effect: IntervalEffect, onsets: Onsets) ->
         found = _simplest(search, again, fit, place, found)
         if best is not None:
             known = _fitted(search, again, fit, place, *_spans(effect, best.fit), best.fit.values)
-            if known is not None and found.score <= known.score + WORTH_ANOTHER:
+            if known is not None and found.score <= known.score + tuned.WORTH_ANOTHER:
                 best = known if known.score > found.score else found
                 break
         best, problem, values = found, again, found.fit.values
@@ -176,7 +170,7 @@ def _simplest(search: Search, problem: Problem, fit: Fit, place: StepPlace, foun
                 place,
                 *spans,
                 _raised(place, search, best.fit.values, lowest),
-                best.fit.misfit_with_prior + HOPELESS,
+                best.fit.misfit_with_prior + tuned.HOPELESS,
             )
             for *spans, lowest in _with_one_less(*_spans(place.effect, best.fit), problem, place)
         ]

@@ -33,6 +33,13 @@ SLOW_TIMES = (600.0, 1200.0, 2400.0, 4800.0)
 # Friction within a gap beyond what the inputs beside it say, one standard deviation as a share of the
 # highest: most machines go on as before.
 GAP_SIGMA = 0.3
+# Gaps shorter than this [s] and smaller changes of an input temperature over one [K] move no reading by its
+# noise; length of a piece of a gap [s], and the most pieces: each is a further coordinate of every fit.
+SHORTEST_GAP, LEAST_CHANGE = 120.0, 1.0
+GAP_PIECE, MOST_PIECES = 150.0, 8
+# A held input that is another in a row changed at any time since the row before it. Rows nearer than this [s]
+# leave nothing open that readings show, and of many changes the largest are left open.
+LEAST_SPACING, MOST_JUMPS, MOST_BETWEEN = 15.0, 60, 20
 # Deviations of a machine with geometry from its definition. A table of heat over speed: one standard
 # deviation as a share, and the share of the speed range over which it is correlated. Share by which balls
 # conduct better at the highest speed. Clocks of inputs and temperatures, s: two loggers set by hand.
@@ -126,6 +133,13 @@ IMPROVEMENT_ROUNDS = 2
 START_SHARES = (1.0, 0.5, 0.2)
 # An interval that lies in gaps of the recording by more than this share explains what nobody recorded.
 MOST_IN_GAPS = 0.5
+
+# Rounds in which a course of states or levels and the fit of everything else settle in turn, gain of a round
+# from which another one follows, and places whose states, and whose levels, are settled so.
+COURSE_ROUNDS, WORTH_ANOTHER = 4, 2.0
+STATE_PLACES, STEP_PLACES = 2, 3
+# Misfit beyond that of a course of levels from which one with a change less is not followed to its optimum.
+HOPELESS = 60.0
 
 # ------------------------------------------------------------------------------------------ final fits
 # Hypotheses that are fitted again on the whole basis: at most, at least, and how much less likely than the

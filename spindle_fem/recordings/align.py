@@ -37,10 +37,11 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
+# A distance of stamps above this many usual ones is a gap.
 GAP_STEPS = 1.5
 UNIFORM_TOLERANCE = 0.01
-LONG_GAP_SECONDS = 1800.0
-LONG_GAP_STEPS = 60.0
+# A pause longer than both divides a recording.
+LONG_GAP_SECONDS, LONG_GAP_STEPS = 1800.0, 60.0
 # Four years, longer than machines are logged in one piece: at one step a minute two million steps are kept,
 # and a wrong stamp would need more memory than any computer has.
 LONGEST_SECONDS = 4.0 * 366.0 * 86400.0

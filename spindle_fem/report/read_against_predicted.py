@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
+from spindle_fem.recordings.align import LONG_GAP_STEPS, Recording
 from spindle_fem.recordings.displaced_readings import MICROMETRES
 from spindle_fem.report.clock_axis import label_times, time_scale
 from spindle_fem.report.figure_style import (
@@ -31,8 +32,6 @@ from spindle_fem.units import ZERO_CELSIUS_K
 if TYPE_CHECKING:
     import xarray as xr
 
-    from spindle_fem.recordings.align import Recording
-
 Array = NDArray[np.float64]
 
 READ, HELD, BAND = "#8a8f94", "#eceff2", "#c9d3dc"
@@ -47,8 +46,6 @@ MOST_POINTS = 1500
 BINS = 240
 # Standard deviations of an interval that should hold nine readings in ten.
 NINE_IN_TEN = 1.645
-# A pause longer than this many usual steps divides a recording.
-LONG_GAP_STEPS = 60.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from spindle_fem.inference import search_course
+from spindle_fem.inference import search_course, tuned
 
 
 class Ever:
@@ -35,7 +35,7 @@ class Ever:
 
 
 @pytest.mark.parametrize(
-    ("gain", "rounds"), [(0.5 * search_course.WORTH_ANOTHER, 1), (1e3, search_course.LARGEST_SET)]
+    ("gain", "rounds"), [(0.5 * tuned.WORTH_ANOTHER, 1), (1e3, search_course.LARGEST_SET)]
 )
 def test_a_state_that_gains_a_little_every_time_is_not_followed_for_ever(monkeypatch, gain, rounds):
     monkeypatch.setattr(search_course, "settle_best", lambda search: None)
