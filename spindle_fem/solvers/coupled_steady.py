@@ -123,16 +123,21 @@ def _settle(
             quick = Iteration(RELAXATION, np.inf, ANDERSON_DEPTH, QUICK_ITERATIONS)
             with contextlib.suppress(ConvergenceError, NoSteadyStateError, *REFUSED):
                 return _iterate(_Operation(machine, point, beyond), None, first, quick)
+    follows = machine.spec.follows_preload
+    if not follows and beyond is None:
+        # Quick, unless heat falls so steeply with temperature that mixing far from the fixed point errs.
+        quick = Iteration(RELAXATION, np.inf, ANDERSON_DEPTH, QUICK_ITERATIONS, MAXIMUM_RETREATS)
+        with contextlib.suppress(ConvergenceError):
+            return _iterate(_Operation(machine, point, beyond, enough), start, first, quick)
     operation = _Operation(machine, point, beyond, enough)
-    far = operation.follows_preload or beyond is not None
     iteration = Iteration(
         relaxation=RELAXATION,
-        # Far from the fixed point, heat that grows with temperature must be followed as the machine warms.
-        mixing_below=MIXING_BELOW if far else np.inf,
+        # Far from the fixed point, heat that changes with temperature must be followed as the machine warms.
+        mixing_below=MIXING_BELOW,
         depth=ANDERSON_DEPTH,
         most=MAXIMUM_ITERATIONS,
         # Cold grease makes more heat than the machine will ever see: its states are left half the way back.
-        retreats=0 if operation.follows_preload else MAXIMUM_RETREATS,
+        retreats=0 if follows else MAXIMUM_RETREATS,
     )
     try:
         return _iterate(operation, start, first, iteration)
