@@ -5,22 +5,16 @@ import pandas as pd
 import pytest
 import tomli_w
 
-from spindle_fem.commands.export_command import export_machine
 from spindle_fem.definition.load import load_machine
-from spindle_fem.model.reduced.drive import drive_of_recording
-from spindle_fem.model.reduced.recorded_model import fast_model_for
-from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.recordings.align import read_recording
-from spindle_fem.studies.export.portable_model import PortableModel
-from spindle_fem.units import ZERO_CELSIUS_K
 from tests.integration.test_circuits_in_models import BORED
 from tests.integration.test_streams_in_models import PURGED
 from tests.support.oiled_machine import OILED
-from tests.support.stepped_model import c_readings_along, needs_compiler, readings_along
+from tests.support.stepped_model import needs_compiler, told_and_found
 
 pytestmark = [pytest.mark.slow, needs_compiler]
-# Largest difference from simulate, K: where a channel's film follows its wall, an export takes the wall along
-# one profile and at the ends of steps.
+# Largest difference from simulate, K: where a channel's film follows its wall, an export takes the wall at
+# the ends of steps, simulate in their middle.
 AGREEMENT = {"oil_and_streams": 8e-3, "bore_beside_a_channel": 1e-3}
 COARSE = ("mesh.preset=coarse",)
 STREAMS = OILED + PURGED.split('name = "purged"')[1]
@@ -70,18 +64,9 @@ def test_python_and_c_agree_with_simulate(text, speed, flow, streams, request, t
     file.write_text(text, encoding="utf-8")
     spec = load_machine(str(file), COARSE)
     recording = recorded(tmp_path, [probe.name for probe in spec.probe], speed, flow, spec.operation.thrust)
-    for name in ("model.npz", "model.c"):
-        export_machine(str(file), tmp_path / name, COARSE)
-    drive = drive_of_recording(spec, recording)
-    start = drive.first("ambient")
-    fast = fast_model_for(spec, [recording], as_given=True)
-    told = simulate_fast(fast, drive, start).temperature - ZERO_CELSIUS_K
-    model = PortableModel.load(tmp_path / "model.npz")
-    rows = np.searchsorted(drive.grid, drive.times[1:] - 1e-7) - 1
-    found = readings_along(model, drive, {0: start - ZERO_CELSIUS_K})[rows]
-    assert streams <= set(model.outputs)
-    # what is compared moves
+    told, found, in_c = told_and_found(tmp_path, str(file), COARSE, recording)
+    # what is compared moves, the outlets too
+    assert streams <= {probe.name for probe in spec.probe}
     assert np.ptp(found, axis=0).min() > 0.05
-    assert np.abs(found - told[1:]).max() < AGREEMENT[request.node.callspec.id]
-    in_c = c_readings_along(tmp_path, spec.name, model, drive, start - ZERO_CELSIUS_K)[rows]
+    assert np.abs(found - told).max() < AGREEMENT[request.node.callspec.id]
     np.testing.assert_allclose(in_c, found, rtol=0.0, atol=1e-7)

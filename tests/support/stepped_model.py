@@ -6,6 +6,12 @@ import subprocess
 import numpy as np
 import pytest
 
+from spindle_fem.commands.export_command import export_machine
+from spindle_fem.definition.load import load_machine
+from spindle_fem.model.reduced.drive import drive_of_recording
+from spindle_fem.model.reduced.recorded_model import fast_model_for
+from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.studies.export.portable_model import PortableModel
 from spindle_fem.units import ZERO_CELSIUS_K
 
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
@@ -42,6 +48,22 @@ def readings_along(model, drive, given, most_steps=None):
         assert model.step(seconds, begin[step], end[step]) == []
         found.append(model.read(after[step]))
     return np.array(found)
+
+
+def told_and_found(folder, machine, overrides, recording):
+    """Outputs at a recording's rows (N - 1, p): by simulate, by the exported machine in Python, in C."""
+    for name in ("model.npz", "model.c"):
+        export_machine(machine, folder / name, overrides)
+    spec = load_machine(machine, overrides)
+    drive = drive_of_recording(spec, recording)
+    start = drive.first("ambient")
+    fast = fast_model_for(spec, [recording], as_given=True)
+    told = simulate_fast(fast, drive, start).temperature[1:] - ZERO_CELSIUS_K
+    model = PortableModel.load(folder / "model.npz")
+    rows = np.searchsorted(drive.grid, drive.times[1:] - 1e-7) - 1
+    found = readings_along(model, drive, {0: start - ZERO_CELSIUS_K})[rows]
+    in_c = c_readings_along(folder, spec.name, model, drive, start - ZERO_CELSIUS_K)[rows]
+    return told, found, in_c
 
 
 PROGRAM = """
