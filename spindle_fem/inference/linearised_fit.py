@@ -232,7 +232,11 @@ class LinearProblem:
         (m, m) ndarray, of the columns; (m,) ndarray, with the data; float, of the data
         """
         n = self.jacobian.shape[1]
-        lower = np.linalg.cholesky(np.eye(n) + self.jacobian.T @ self.jacobian)
+        try:
+            lower = np.linalg.cholesky(np.eye(n) + self.jacobian.T @ self.jacobian)
+        except np.linalg.LinAlgError:
+            # Coordinates that move readings by 1e8 of their noise leave no digit of the identity in it.
+            lower = np.linalg.qr(np.vstack((np.eye(n), self.jacobian)), mode="r").T
         columns = self.weight[:, None] * columns
         seen = solve_triangular(lower, self.jacobian.T @ columns, lower=True)
         data = solve_triangular(lower, self.jacobian.T @ self.data, lower=True)
