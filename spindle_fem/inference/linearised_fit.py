@@ -33,6 +33,10 @@ def _pressed(fit: Fit, downhill: Array) -> NDArray[np.bool_]:
     )
 
 
+# Moves of readings by one standard deviation of a coordinate, in units of noise, where temperatures run away.
+RUNNING_AWAY = 1e7
+
+
 @dataclass(frozen=True, slots=True)
 class Box:
     """Moves of a fit's coordinates, each between its bounds: ``|r - J d|² + |root (d + d0)|²``.
@@ -202,6 +206,9 @@ class LinearProblem:
         # Belief about the free coordinates, given those that stay.
         q, r = np.linalg.qr(root[:, free])
         unit = np.linalg.solve(r.T, jacobian[:, free].T).T
+        if not np.abs(unit).max(initial=0.0) < RUNNING_AWAY:
+            what = "a fit on the edge of running away with its temperatures has no first order about it."
+            raise ConvergenceError("fit", what, "Narrower priors in the definition keep fits away from it.")
         return cls(
             weight * (residual + unit @ (q.T @ departure)),
             weight[:, None] * unit,
