@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from spindle_fem.effects.framework.effect import Candidate
-from spindle_fem.errors import ConvergenceError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
@@ -85,10 +84,7 @@ def _with_laws(
     if base is None:
         return []
     if identity(rest) not in search.screenings:
-        try:
-            search.screened(base.fit)
-        except ConvergenceError:
-            return []
+        search.screened(base.fit)
     screened = search.screenings[identity(rest)]
     found = screened.best_of(lambda c: allowed(c) and not search.in_intervals(c), tuned.EFFECTS_EXCHANGED)
     return [search.task(base.fit, [(screened.variants[index], amplitude)], {}) for index, amplitude in found]

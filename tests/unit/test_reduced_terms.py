@@ -293,6 +293,26 @@ def test_a_term_that_runs_away_is_refused_with_its_time(fast):
         simulate_fast(fast, drive, 293.15, terms=(Runaway(),))
 
 
+def test_a_term_that_runs_away_late_is_refused_before_the_machine_is_molten(fast):
+    """What it remembers answers a step later, so that every step has a state, each hotter than the last."""
+
+    class Late(Term):
+        name = "late"
+        n_states = 1
+        heat_places = ("F1.inner_raceway",)
+        reads = ("F1.inner_ring",)
+
+        def heat(self, context):
+            return 2e4 * context.state
+
+        def advance(self, context, step):
+            return context.temperatures - 293.15
+
+    drive = drive_of(np.arange(0.0, 3600.0, 20.0), 3000.0)
+    with pytest.raises(ConvergenceError, match=r"t = .* run away to \d{4} K"):
+        simulate_fast(fast, drive, 293.15, terms=(Late(),))
+
+
 def wrong(**attributes):
     return type("Wrong", (Term,), {"name": "wrong", **attributes})()
 

@@ -37,6 +37,8 @@ MOST_ROUNDS = 8
 CERTAIN = 0.02
 # A round that moves what is sensed by more than this, K, has left what the terms can answer.
 LOST = 1000.0
+# Beyond this, K, no machine is: steel melts. Terms that answer late take it there without losing their state.
+MOLTEN = 1800.0
 
 
 @dataclass(slots=True)
@@ -307,6 +309,13 @@ class TermMarch:
             evaluator = self._evaluator(after, step, memory)
             answer = answers.replies[group][size:]
             added, end = solve_added(evaluator, base[size:], answer, guess, float(drive.grid[step + 1]))
+            hottest = float(np.abs(base[size:] + answer @ added).max(initial=0.0))
+            if hottest > MOLTEN:
+                raise ConvergenceError(
+                    f"t = {drive.grid[step + 1]:.0f} s",
+                    f"the terms of the fast model run away to {hottest:.0f} K.",
+                    "Their heat may rise faster with temperature than it can flow away.",
+                )
             ends.append(end)
             added_start[step], added_end[step] = first, added
             states[step + 1] = base[:size] + answers.replies[group][:size] @ added
