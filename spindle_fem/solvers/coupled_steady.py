@@ -114,20 +114,18 @@ def _settle(
     enough: float = 0.0,
 ) -> CoupledState:
     """The fixed point, or with ``enough`` a field that its own loads move by less than that, K."""
-    first = None
-    if machine.spec.follows_preload and start is None:
+    follows, first = machine.spec.follows_preload, None
+    # Cold grease makes more heat than the machine will ever see: its states are left half the way back.
+    retreats = 0 if follows else MAXIMUM_RETREATS
+    if follows and start is None:
         # Cold grease makes heat that would carry the loop past the fixed point.
         first = _settle(without_expansion(machine), point, None, beyond, enough=FIRST_STATE)
-        if beyond is None:
-            # Quick where there is an equilibrium; what fails here may still be crept up to.
-            quick = Iteration(RELAXATION, np.inf, ANDERSON_DEPTH, QUICK_ITERATIONS)
-            with contextlib.suppress(ConvergenceError, NoSteadyStateError, *REFUSED):
-                return _iterate(_Operation(machine, point, beyond), None, first, quick)
-    follows = machine.spec.follows_preload
-    if not follows and beyond is None:
-        # Quick, unless heat falls so steeply with temperature that mixing far from the fixed point errs.
-        quick = Iteration(RELAXATION, np.inf, ANDERSON_DEPTH, QUICK_ITERATIONS, MAXIMUM_RETREATS)
-        with contextlib.suppress(ConvergenceError):
+    if beyond is None and (first is not None or not follows):
+        # Quick, unless heat changes so steeply with temperature that mixing far from the fixed point errs;
+        # where preload follows too, what fails here may still be crept up to.
+        quick = Iteration(RELAXATION, np.inf, ANDERSON_DEPTH, QUICK_ITERATIONS, retreats)
+        failed = (ConvergenceError, NoSteadyStateError, *REFUSED) if follows else (ConvergenceError,)
+        with contextlib.suppress(*failed):
             return _iterate(_Operation(machine, point, beyond, enough), start, first, quick)
     operation = _Operation(machine, point, beyond, enough)
     iteration = Iteration(
@@ -136,8 +134,7 @@ def _settle(
         mixing_below=MIXING_BELOW,
         depth=ANDERSON_DEPTH,
         most=MAXIMUM_ITERATIONS,
-        # Cold grease makes more heat than the machine will ever see: its states are left half the way back.
-        retreats=0 if follows else MAXIMUM_RETREATS,
+        retreats=retreats,
     )
     try:
         return _iterate(operation, start, first, iteration)
