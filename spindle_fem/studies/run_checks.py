@@ -50,14 +50,13 @@ def check_measures(kind: str, errors: dict[str, float]) -> Check:
 
 def check_coldest(coldest_inside: float, coldest_outside: float) -> Check:
     """Without a heat sink nothing inside is colder than all its surroundings."""
-    return _within(
-        "below coldest surroundings",
-        max(0.0, coldest_outside - coldest_inside),
-        BELOW_COLDEST_LIMIT,
-        "K",
-        f"Coldest surroundings {coldest_outside - ZERO_CELSIUS_K:.2f} °C. Elements are too large for the "
-        "steepest film: mesh.order = 2, or a smaller mesh.size_factor.",
-    )
+    below = max(0.0, coldest_outside - coldest_inside)
+    what = f"Coldest surroundings {coldest_outside - ZERO_CELSIUS_K:.2f} °C."
+    if below > BELOW_COLDEST_LIMIT:
+        what += (
+            " Elements are too large for the steepest film: mesh.order = 2, or a smaller mesh.size_factor."
+        )
+    return _within("below coldest surroundings", below, BELOW_COLDEST_LIMIT, "K", what)
 
 
 def check_lubricant(word: str, temperatures: dict[str, float], limit: float) -> Check:
