@@ -14,7 +14,7 @@ from spindle_fem.library.loaded_machine import Machine, Progress, definition_fil
 from spindle_fem.recordings.align import Recording
 from spindle_fem.report.diagnosis_charts import residual_map
 from spindle_fem.report.diagnosis_odds import set_probabilities
-from spindle_fem.report.read_against_predicted import before_after
+from spindle_fem.report.read_against_predicted import before_after, displaced_before_after
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,8 +42,25 @@ class MachineDiagnosis(FolderResult):
         return xr.load_dataset(file)
 
     def plot_before_after(self, number: int = 0) -> Figure:
-        """Every channel of a recording, counted from 0, with the predictions before and after."""
+        """Every temperature of a recording, counted from 0, with the predictions before and after."""
         return before_after(self.to_xarray(), number)
+
+    def plot_displacements(self, number: int = 0) -> Figure:
+        """Every displacement of a recording, counted from 0, with the predictions before and after.
+
+        Raises
+        ------
+        BadInputError
+            None was read.
+        """
+        figure = displaced_before_after(self.to_xarray(), number)
+        if figure is None:
+            raise BadInputError(
+                str(self.folder),
+                f"recording {number} has no displacement that was read.",
+                'A channel with role = "displacement" and the probe of a [[displacement_sensor]] is one.',
+            )
+        return figure
 
     def plot_residuals(self) -> Figure:
         """Mean residual of each channel in each condition, before and after."""

@@ -107,7 +107,8 @@ def _edges(speed: NDArray[np.float64], largest: float, width: float) -> list[flo
 
 
 def _trends(recording: Recording) -> dict[str, NDArray[np.bool_]]:
-    usable = recording.usable
+    count = recording.temperature_count
+    usable, sigma = recording.usable[:, :count], recording.sigma[:count]
     rate = np.zeros(recording.times.size)
     smoothing = np.zeros(recording.times.size)
     for begin, end in recording.segments:
@@ -115,7 +116,7 @@ def _trends(recording: Recording) -> dict[str, NDArray[np.bool_]]:
         if length < 5:
             continue
         columns = []
-        for column in range(usable.shape[1]):
+        for column in range(count):
             rows = np.flatnonzero(usable[begin:end, column])
             if rows.size >= 2:
                 times = recording.times[begin:end]
@@ -126,7 +127,7 @@ def _trends(recording: Recording) -> dict[str, NDArray[np.bool_]]:
         mean = uniform_filter1d(np.mean(columns, axis=0), window, mode="nearest")
         rate[begin:end] = np.gradient(mean, recording.times[begin:end])
         step = np.median(np.diff(recording.times[begin:end]))
-        noise = float(np.sqrt(np.mean(recording.sigma**2) / len(columns)))
+        noise = float(np.sqrt(np.mean(sigma**2) / len(columns)))
         # difference of two window means, one window apart
         smoothing[begin:end] = TREND_SIGMAS * noise * np.sqrt(2.0 / window) / (window * step)
     threshold = np.maximum(TREND_SHARE * np.quantile(np.abs(rate), 0.98), smoothing)

@@ -13,22 +13,6 @@ from spindle_fem.recordings.channel_checks import Flag
 MICROMETRES = 1.0e6
 
 
-def without_displacements(recording: Recording) -> Recording:
-    """The recording with temperatures only among its readings."""
-    count = recording.temperature_count
-    if count == len(recording.temperature_names):
-        return recording
-    return replace(
-        recording,
-        temperature_names=recording.temperature_names[:count],
-        probes=recording.probes[:count],
-        temperature=recording.temperature[:, :count],
-        flags=recording.flags[:, :count],
-        sigma=recording.sigma[:count],
-        noise=recording.noise[:count],
-    )
-
-
 def with_displacements(recording: Recording) -> Recording:
     """The recording with its displacements as the last of its readings, in micrometres.
 

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import Coordinate
+from spindle_fem.inference.findings import channel_noise
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.mismatch_place import component_shares
 from spindle_fem.inference.next_measurement import hypothesis_words
 from spindle_fem.inference.verdict import rank
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.conditions import operating_conditions
-from spindle_fem.recordings.displaced_readings import without_displacements
+from spindle_fem.recordings.displaced_readings import MICROMETRES
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
@@ -39,18 +40,21 @@ def diagnosis_dataset(diagnosis: Diagnosis, before: Sequence[Array], after: Sequ
     Parameters
     ----------
     before, after : sequence of (N, c) ndarray, [K]
-        Predictions at the stamps of every recording, without and with what was found.
+        Predictions at the stamps of every recording, without and with what was found; of a displacement
+        in µm, from the sensor's zero.
 
     Returns
     -------
     Dataset
-        Temperatures in °C, inputs in SI.
+        Temperatures in °C, inputs in SI, displacements in m along ``displacement_name`` where there are any.
     """
     import xarray as xr
 
-    recordings = [without_displacements(item) for item in diagnosis.predictor.recordings]
+    recordings = diagnosis.predictor.recordings
+    displaced = _channels(recordings, displaced=True)
     variables: dict[str, Any] = {}
     variables |= _readings(diagnosis, before, after)
+    variables |= _displaced(diagnosis, before, after) if displaced else {}
     variables |= _inputs(recordings)
     probes = {n: p for item in recordings for n, p in zip(item.temperature_names, item.probes, strict=True)}
     variables["channel_probe"] = ("channel", [probes[name] for name in _channels(recordings)])
@@ -63,6 +67,7 @@ def diagnosis_dataset(diagnosis: Diagnosis, before: Sequence[Array], after: Sequ
         coords={
             "channel": list(_channels(recordings)),
             "recording": [item.name for item in recordings],
+            **({"displacement_name": list(displaced)} if displaced else {}),
         },
         attrs={
             "schema": DATA_SCHEMA,
@@ -74,37 +79,57 @@ def diagnosis_dataset(diagnosis: Diagnosis, before: Sequence[Array], after: Sequ
             "slow_error_s": diagnosis.final.slow.time,
         },
     )
-    for name in ("measured", "before", "after", "input", "usable", "condition_holds"):
-        data[name].encoding |= COMPRESSED
+    for name, variable in data.variables.items():
+        if "stamp" in variable.dims and len(variable.dims) == 2:
+            data[name].encoding |= COMPRESSED
     return data
 
 
-def _channels(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(name for item in recordings for name in item.temperature_names))
+def _part(recording: Recording, *, displaced: bool) -> slice:
+    """Columns of the temperatures among a recording's readings, or of the displacements."""
+    count = recording.temperature_count
+    return slice(count, None) if displaced else slice(count)
+
+
+def _channels(recordings: Sequence[Recording], *, displaced: bool = False) -> tuple[str, ...]:
+    parts = [item.temperature_names[_part(item, displaced=displaced)] for item in recordings]
+    return tuple(dict.fromkeys(name for part in parts for name in part))
 
 
 def _joined(
-    recordings: Sequence[Recording], values: Sequence[Array], empty: float, dtype: type = np.float32
+    recordings: Sequence[Recording],
+    values: Sequence[Array],
+    empty: float,
+    dtype: type = np.float32,
+    *,
+    displaced: bool = False,
 ) -> Array:
     """Columns of every recording under the channels of all, (stamps, channels)."""
-    names = _channels(recordings)
+    names = _channels(recordings, displaced=displaced)
     found = []
     for item, own in zip(recordings, values, strict=True):
+        part = _part(item, displaced=displaced)
         table = np.full((item.times.size, len(names)), empty, dtype=dtype)
-        table[:, [names.index(name) for name in item.temperature_names]] = own[:, : item.temperature_count]
+        table[:, [names.index(name) for name in item.temperature_names[part]]] = own[:, part]
         found.append(table)
     return np.concatenate(found)
 
 
-def _readings(diagnosis: Diagnosis, before: Sequence[Array], after: Sequence[Array]) -> dict[str, Any]:
-    recordings = [without_displacements(item) for item in diagnosis.predictor.recordings]
-    names = _channels(recordings)
-    celsius = {"units": "degC"}
+def _noise(diagnosis: Diagnosis, *, displaced: bool = False) -> Array:
+    """One sigma of a reading, rounding included, (recordings, channels) K or µm; NaN where it is not read."""
+    recordings = diagnosis.predictor.recordings
+    names = _channels(recordings, displaced=displaced)
     sigma = np.full((len(recordings), len(names)), np.nan)
     for row, item in enumerate(recordings):
-        for column, name in enumerate(item.temperature_names):
-            rounding = item.noise[column].resolution / np.sqrt(12.0)
-            sigma[row, names.index(name)] = np.hypot(item.sigma[column], rounding)
+        for column in range(len(item.temperature_names))[_part(item, displaced=displaced)]:
+            own = names.index(item.temperature_names[column])
+            sigma[row, own] = channel_noise(diagnosis.predictor, item, column)
+    return sigma
+
+
+def _readings(diagnosis: Diagnosis, before: Sequence[Array], after: Sequence[Array]) -> dict[str, Any]:
+    recordings = diagnosis.predictor.recordings
+    celsius = {"units": "degC"}
 
     def table(values: Sequence[Array], title: str) -> tuple:
         shifted = [item - ZERO_CELSIUS_K for item in values]
@@ -132,10 +157,35 @@ def _readings(diagnosis: Diagnosis, before: Sequence[Array], after: Sequence[Arr
         "after": table(after, "prediction with what was found"),
         "noise": (
             ("recording", "channel"),
-            sigma,
+            _noise(diagnosis),
             {"units": "K", "long_name": "1 sigma of one reading, rounding included"},
         ),
         "start_stamp": ("recording", [item.start or "" for item in recordings]),
+    }
+
+
+def _displaced(diagnosis: Diagnosis, before: Sequence[Array], after: Sequence[Array]) -> dict[str, Any]:
+    """Displacements from the first reading of each."""
+    recordings = diagnosis.predictor.recordings
+
+    def table(values: Sequence[Array], title: str) -> tuple:
+        metres = [item / MICROMETRES for item in values]
+        along = ("stamp", "displacement_name")
+        joined = _joined(recordings, metres, np.nan, displaced=True)
+        return along, joined, {"units": "m", "long_name": title}
+
+    read = [np.where(item.usable, item.temperature, np.nan) for item in recordings]
+    return {
+        "displacement": table(read, "reading; none where it carries a flag"),
+        "displacement_before": table(before, "prediction, nothing added, from the sensor's estimated zero"),
+        "displacement_after": table(
+            after, "prediction with what was found, from the sensor's estimated zero"
+        ),
+        "displacement_noise": (
+            ("recording", "displacement_name"),
+            _noise(diagnosis, displaced=True) / MICROMETRES,
+            {"units": "m", "long_name": "1 sigma of one reading, rounding included"},
+        ),
     }
 
 

@@ -48,7 +48,7 @@ from spindle_fem.report.diagnosis_words import (
     verdict_sentence,
 )
 from spindle_fem.report.figure_style import save_png
-from spindle_fem.report.read_against_predicted import before_after
+from spindle_fem.report.read_against_predicted import before_after, displaced_before_after
 from spindle_fem.results.dataset import load_netcdf
 from spindle_fem.results.output_folder import read_content, replace_text
 
@@ -57,6 +57,8 @@ if TYPE_CHECKING:
 
 CAPTIONS = {
     "before_after": "Readings, model before and after, and what each leaves; shaded: not fitted.",
+    "displacements": "Displacements as read, model before and after, and what each leaves, but for where the sensor "
+    "was set; shaded: not fitted.",
     "residual_map": "Root mean square residual by channel and condition, before and after.",
     "sets": "Probability of every set of effects that was fitted to the end.",
     "findings": "Parameters of the findings, with 90 % intervals.",
@@ -147,6 +149,9 @@ def _figures(
 
     for recording in recordings:
         yield numbered("before_after", recording), before_after(data, recording)
+        displaced = displaced_before_after(data, recording)
+        if displaced is not None:
+            yield numbered("displacements", recording), displaced
     yield "residual_map", residual_map(data)
     sensors = sensors_named(content)
     places = [name for name in content["mismatch"]["where"]["credible"] if name not in sensors]
@@ -210,7 +215,11 @@ def render(content: Mapping[str, Any], pictures: Mapping[str, list[Any]]) -> str
         Section(
             "fit",
             "Before and after",
-            [fit_table(content), *of("before_after"), *of("residual_map"), *channel_table(content)],
+            [
+                fit_table(content),
+                *of("before_after", "displacements", "residual_map"),
+                *channel_table(content),
+            ],
         ),
         *full_model_sections(content),
         Section("what", "Which physics", [*of("sets", "findings"), *set_tables(content)]),

@@ -241,7 +241,7 @@ def _safe(name: str) -> str:
 
 
 def before_after(data: xr.Dataset, number: int) -> Figure:
-    """Every channel of a diagnosed recording with the predictions before and after.
+    """Every temperature of a diagnosed recording with the predictions before and after.
 
     Parameters
     ----------
@@ -268,8 +268,43 @@ def before_after(data: xr.Dataset, number: int) -> Figure:
                 item["held_out"].values == 1,
             )
         )
-    title = f"{data['recording'].values[number]}: before and after"
-    notes = "Temperature above, residual (read − model, means over short times) beneath."
+    return _before_after_figure(courses, "Temperature", data, number)
+
+
+def displaced_before_after(data: xr.Dataset, number: int) -> Figure | None:
+    """Every displacement of a diagnosed recording, in µm, with the predictions before and after.
+
+    None where none was read; parameters as of :func:`before_after`.
+    """
+    if "displacement" not in data:
+        return None
+    own = of_recording(data, number)
+    courses = []
+    for name in own["displacement_name"].values:
+        item = own.sel(displacement_name=name)
+        if not np.isfinite(item["displacement"].values).any():
+            continue
+        before, after = (item[f"displacement_{when}"].values for when in ("before", "after"))
+        courses.append(
+            Course(
+                str(name),
+                item["time"].values,
+                MICROMETRES * item["displacement"].values,
+                {"model before": MICROMETRES * before, "model after": MICROMETRES * after},
+                2.0 * MICROMETRES * float(item["displacement_noise"].values[number]),
+                item["held_out"].values == 1,
+                ("µm", "µm"),
+            )
+        )
+    if not courses:
+        return None
+    return _before_after_figure(courses[:MOST_CHANNELS], "Displacement since its first reading", data, number)
+
+
+def _before_after_figure(courses: list[Course], read: str, data: xr.Dataset, number: int) -> Figure:
+    named = f", {courses[0].name}" if len(courses) == 1 else ""
+    title = f"{data['recording'].values[number]}{named}: before and after"
+    notes = f"{read} above, residual (read − model, means over short times) beneath."
     start = str(data["start_stamp"].values[number]) or None
     return courses_figure(courses, title, notes, "noise, ± 2 σ of a reading", start)
 

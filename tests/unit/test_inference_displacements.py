@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.machine_spec import DisplacementSensor
@@ -41,8 +42,11 @@ from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import write_simulated
-from spindle_fem.recordings.displaced_readings import with_displacements, without_displacements
+from spindle_fem.recordings.conditions import operating_conditions
+from spindle_fem.recordings.displaced_readings import with_displacements
+from spindle_fem.report.diagnosis_data import diagnosis_dataset
 from spindle_fem.report.diagnosis_tables import channel_table
+from spindle_fem.report.read_against_predicted import displaced_before_after
 from tests.support.lumped_spindle import lumped_model
 
 MANIFEST = """schema = "spindle-fem/recording/1"
@@ -240,7 +244,6 @@ def test_displacements_are_told_apart_from_temperatures(heated):
     opened = with_growth(heated[0])
     predictor = Predictor(opened.fast, opened.recordings)
     recording = opened.recordings[0]
-    assert without_displacements(recording).temperature_names == ("SP01", "SP05")
     fit = Problem(predictor, known_before(predictor), EXPECTED_SLOW, predictor.observations).fit()
     told = predictions_at_stamps(predictor, fit)
     far = [told[0] + [0.0, 0.0, 1000.0]]
@@ -297,10 +300,76 @@ def test_the_report_tells_of_displacements_in_micrometres():
     assert "0.200" in str(grown.rows)
 
 
-@pytest.mark.slow
-def test_a_diagnosis_with_displacements_names_the_drive(heated):
+def drawn_lines(figure):
+    """What is drawn of the only channel: readings, before, after; then what each leaves."""
+    upper, lower = figure.axes
+    return [line.get_ydata() for line in upper.lines], [line.get_ydata() for line in lower.lines[1:]]
+
+
+def test_displacements_are_drawn_in_micrometres_beside_both_models():
+    times = np.arange(0.0, 3600.0, 60.0)
+    read = 1e-6 * np.linspace(0.0, 12.0, times.size)
+    read[7] = np.nan
+    along = ("stamp", "displacement_name")
+    data = xr.Dataset(
+        {
+            "time": ("stamp", times),
+            "recording_index": ("stamp", np.zeros(times.size, dtype=int)),
+            "held_out": ("stamp", np.zeros(times.size, dtype=int)),
+            "displacement": (along, read[:, None]),
+            "displacement_before": (along, read[:, None] - 3e-6),
+            "displacement_after": (along, read[:, None]),
+            "displacement_noise": (("recording", "displacement_name"), [[0.3e-6]]),
+            "start_stamp": ("recording", [""]),
+        },
+        {"displacement_name": ["S1"], "recording": ["nose"]},
+    )
+    figure = displaced_before_after(data, 0)
+    (shown, before, after), (left_before, left_after) = drawn_lines(figure)
+    assert shown == pytest.approx(1e6 * np.delete(read, 7))
+    assert np.nanmax(after - before) == pytest.approx(3.0)
+    assert left_before == pytest.approx(3.0)
+    assert left_after == pytest.approx(0.0, abs=1e-9)
+    assert [axes.get_ylabel() for axes in figure.axes] == ["µm", "residual / µm"]
+    assert displaced_before_after(data.drop_vars("displacement"), 0) is None
+    assert displaced_before_after(data.assign(displacement=data["displacement"] * np.nan), 0) is None
+
+
+def test_heating_and_cooling_follow_from_temperatures_alone(recording):
+    conditions = [
+        operating_conditions(with_displacements(replace(recording, displacements=item)))
+        for item in (recording.displacements, -50.0 * recording.displacements)
+    ]
+    np.testing.assert_array_equal(conditions[0].marks, conditions[1].marks)
+
+
+@pytest.fixture(scope="module")
+def diagnosed(heated):
     """From the recording to the judgement."""
-    done = diagnose_recordings(with_growth(heated[0]))
-    assert [(c.effect, c.component) for c in done.final.candidates] == [("drive_heat", "drive_end")]
-    (row,) = displacement_errors(done.predictor, predictions_at_stamps(done.predictor, done.final))
+    return diagnose_recordings(with_growth(heated[0]))
+
+
+@pytest.mark.slow
+def test_a_diagnosis_with_displacements_names_the_drive(diagnosed):
+    assert [(c.effect, c.component) for c in diagnosed.final.candidates] == [("drive_heat", "drive_end")]
+    after = predictions_at_stamps(diagnosed.predictor, diagnosed.final)
+    (row,) = displacement_errors(diagnosed.predictor, after)
     assert row["rmse_um"] < 0.15
+
+
+@pytest.mark.slow
+def test_the_dataset_of_a_diagnosis_keeps_displacements_apart(diagnosed):
+    before, after = (
+        predictions_at_stamps(diagnosed.predictor, fit) for fit in (diagnosed.null, diagnosed.final)
+    )
+    data = diagnosis_dataset(diagnosed, before, after)
+    assert list(data["channel"].values) == ["SP01", "SP05"]
+    assert list(data["displacement_name"].values) == ["S1"]
+    read = diagnosed.predictor.recordings[0].displacements
+    assert data["displacement"].values == pytest.approx(read, abs=1e-11)
+    assert data["displacement_noise"].values == pytest.approx(1e-7, rel=0.02)
+    left = [float((data[f"displacement_{w}"] - data["displacement"]).std()) for w in ("before", "after")]
+    assert left[0] > 5.0 * left[1]
+    assert left[1] < 0.15e-6
+    (shown, *_), _ = drawn_lines(displaced_before_after(data, 0))
+    assert np.ptp(shown) == pytest.approx(1e6 * np.ptp(read), rel=1e-4)
