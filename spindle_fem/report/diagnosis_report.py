@@ -57,8 +57,8 @@ if TYPE_CHECKING:
 
 CAPTIONS = {
     "before_after": "Readings, model before and after, and what each leaves; shaded: not fitted.",
-    "displacements": "Displacements as read, model before and after, and what each leaves, but for where the sensor "
-    "was set; shaded: not fitted.",
+    "displacements": "Displacements as read, model before and after, and what each leaves, but for where "
+    "the sensor was set; shaded: not fitted.",
     "residual_map": "Root mean square residual by channel and condition, before and after.",
     "sets": "Probability of every set of effects that was fitted to the end.",
     "findings": "Parameters of the findings, with 90 % intervals.",

@@ -335,12 +335,9 @@ def test_displacements_are_drawn_in_micrometres_beside_both_models():
     assert displaced_before_after(data.assign(displacement=data["displacement"] * np.nan), 0) is None
 
 
-def test_heating_and_cooling_follow_from_temperatures_alone(recording):
-    conditions = [
-        operating_conditions(with_displacements(replace(recording, displacements=item)))
-        for item in (recording.displacements, -50.0 * recording.displacements)
-    ]
-    np.testing.assert_array_equal(conditions[0].marks, conditions[1].marks)
+def test_heating_follows_from_temperatures_alone(recording):
+    shrinking = replace(recording, displacements=-50.0 * recording.displacements)
+    assert operating_conditions(with_displacements(shrinking)).names == ("heating",)
 
 
 @pytest.fixture(scope="module")
