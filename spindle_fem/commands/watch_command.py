@@ -46,7 +46,7 @@ def watch(
     ------
     dict
         ``time``, ``state`` (``as modelled``, ``leaving``, ``left``), ``channel``, ``condition``,
-        ``false_alarms_per_month``, ``departure_K``, ``evidence``.
+        ``false_alarms_per_month``, ``departure_K`` (of a displacement ``departure_um``), ``evidence``.
 
     Raises
     ------

@@ -13,10 +13,10 @@ EXPANSION_SIGMA = 0.04
 
 
 def expansion(base: BaseRun) -> Change:
-    """Displacements for as much growth again; the sensors' zeros are free, and temperatures stay."""
+    """Displacements since assembly for as much growth again; temperatures stay."""
     grown = base.told().copy()
     grown[:, : base.predictor.recordings[base.number].temperature_count] = 0.0
-    return Change(direct=grown - grown[0])
+    return Change(direct=grown)
 
 
 def growth_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:

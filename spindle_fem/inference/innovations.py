@@ -1,14 +1,17 @@
 """Information of readings beyond those before them: a Kalman filter over parameters and slow errors.
 
-Unknown are the machine's coordinates (in units of their priors) and one slow error per channel. A reading is
-the prediction, plus its derivatives times the departure of the coordinates, plus the slow error, plus white
-noise. As long as the machine is as its model and the noise as stated, the differences between readings and
-what those before them lead to expect are independent from instant to instant, of known spread.
+Unknown are the machine's coordinates (in units of their priors), one slow error per channel and the zero of
+every displacement sensor. A reading is the prediction, plus its derivatives times the departure of the
+coordinates, plus the slow error, plus white noise, of a displacement plus the zero. As long as the machine is
+as its model and the noise as stated, the differences between readings and what those before them lead to
+expect are independent from instant to instant, of known spread.
 
 Source: Anderson & Moore (1979), Optimal Filtering, chapters 3 and 5.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,36 +21,56 @@ from spindle_fem.inference.reading_noise import SlowError
 
 Array = NDArray[np.float64]
 
+# Prior of a displacement sensor's zero about its first reading, µm: nothing is known of it.
+ZERO_SIGMA = 1.0e3
+
 
 class InnovationFilter:
-    """Departures of the coordinates and slow errors of the channels, carried from instant to instant.
+    """Departures of the coordinates, slow errors and zeros of the channels, carried from instant to instant.
 
     Parameters
     ----------
     covariance : (p, p) ndarray
         Of the coordinates about where the machine is linearised.
-    slow : SlowError
-    channels : int
+    slow : sequence of SlowError
+        Of every channel, K or µm.
+    relative : sequence of int
+        The d channels with an unknown zero: displacements. Their first reading sets it and says nothing else.
 
     Attributes
     ----------
-    mean : (p + c,) ndarray
-        Departures of the coordinates, then slow errors [K].
-    covariance : (p + c, p + c) ndarray
+    mean : (p + c + d,) ndarray
+        Departures of the coordinates, then slow errors [K, µm], then zeros [µm].
+    covariance : (p + c + d, p + c + d) ndarray
+    slow_sigma : (c,) ndarray, [K, µm]
+        Usual size of the slow errors.
     """
 
-    def __init__(self, covariance: Array, slow: SlowError, channels: int) -> None:
-        self.slow, self._own = slow, len(covariance)
-        size = self._own + channels
+    def __init__(self, covariance: Array, slow: Sequence[SlowError], relative: Sequence[int] = ()) -> None:
+        self.slow_sigma = np.array([item.sigma for item in slow])
+        self._time = np.array([item.time for item in slow])
+        self._errors = slice(len(covariance), len(covariance) + len(slow))
+        self._zero = {channel: self._errors.stop + place for place, channel in enumerate(relative)}
+        self._known = np.array([channel not in self._zero for channel in range(len(slow))])
+        variances = np.concatenate((self.slow_sigma**2, np.full(len(relative), ZERO_SIGMA**2)))
+        size = len(covariance) + len(variances)
         self.mean = np.zeros(size)
         self.covariance = np.zeros((size, size))
-        self.covariance[: self._own, : self._own] = covariance
-        self.covariance[self._own :, self._own :] = slow.sigma**2 * np.eye(channels)
+        self.covariance[: len(covariance), : len(covariance)] = covariance
+        self.covariance[len(covariance) :, len(covariance) :] = np.diag(variances)
 
     @property
     def slow_errors(self) -> Array:
-        """Estimated slow error of every channel, K."""
-        return self.mean[self._own :]
+        """Estimated slow error of every channel, (c,) K or µm."""
+        return self.mean[self._errors]
+
+    @property
+    def zeros(self) -> Array:
+        """Estimated zero of every channel, (c,) µm; nothing for temperatures."""
+        found = np.zeros(len(self._known))
+        for channel, place in self._zero.items():
+            found[channel] = self.mean[place]
+        return found
 
     def step(self, elapsed: float, residual: Array, slopes: Array, white: Array, *, learn: bool) -> Array:
         """Take the readings of one instant.
@@ -56,26 +79,26 @@ class InnovationFilter:
         ----------
         elapsed : float, [s]
             Since the instant before.
-        residual : (c,) ndarray, [K]
+        residual : (c,) ndarray, [K, µm]
             Read less predicted; NaN where nothing was read.
-        slopes : (c, p) ndarray, [K]
+        slopes : (c, p) ndarray, [K, µm]
             Derivatives of the prediction to the coordinates.
-        white : (c,) ndarray, [K]
+        white : (c,) ndarray, [K, µm]
             Standard deviation of the white noise.
         learn : bool
-            Whether the coordinates learn from the readings, or only the slow errors.
+            Whether the coordinates learn from the readings, or only slow errors and zeros.
 
         Returns
         -------
         (c,) ndarray
-            Innovations over their standard deviations; NaN where nothing was read.
+            Innovations over their standard deviations; NaN where nothing was read, or only a zero set.
         """
-        own, kept = self._own, np.exp(-elapsed / self.slow.time)
-        self.mean[own:] *= kept
-        self.covariance[own:] *= kept
-        self.covariance[:, own:] *= kept
-        errors = np.arange(own, len(self.mean))
-        self.covariance[errors, errors] += self.slow.sigma**2 * (1.0 - kept**2)
+        own, errors, kept = self._errors.start, self._errors, np.exp(-elapsed / self._time)
+        self.mean[errors] *= kept
+        self.covariance[errors] *= kept[:, None]
+        self.covariance[:, errors] *= kept
+        diagonal = np.arange(errors.start, errors.stop)
+        self.covariance[diagonal, diagonal] += self.slow_sigma**2 * (1.0 - kept**2)
         read = np.flatnonzero(np.isfinite(residual))
         told = np.full(len(residual), np.nan)
         if not read.size:
@@ -83,12 +106,19 @@ class InnovationFilter:
         observes = np.zeros((read.size, len(self.mean)))
         observes[:, :own] = slopes[read]
         observes[np.arange(read.size), own + read] = 1.0
+        fresh = ~self._known[read]
+        for row, channel in enumerate(read.tolist()):
+            if channel in self._zero:
+                if fresh[row]:
+                    self.mean[self._zero[channel]] = residual[channel] - observes[row] @ self.mean
+                observes[row, self._zero[channel]] = 1.0
+        self._known[read] = True
         noise = np.diag(white[read] ** 2)
         across = self.covariance @ observes.T
         spread = observes @ across + noise
         innovation = residual[read] - observes @ self.mean
         sigma = np.sqrt(np.diag(spread))
-        told[read] = innovation / sigma
+        told[read] = np.where(fresh, np.nan, innovation / sigma)
         gain = np.linalg.solve(spread, across.T).T
         if not learn:
             gain[:own] = 0.0
@@ -99,6 +129,7 @@ class InnovationFilter:
 
     def moved(self) -> Array:
         """Departures of the coordinates, (p,), which count from there afterwards."""
-        found = self.mean[: self._own].copy()
-        self.mean[: self._own] = 0.0
+        own = self._errors.start
+        found = self.mean[:own].copy()
+        self.mean[:own] = 0.0
         return found

@@ -267,6 +267,7 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
         fit = problem.fit((), None if fit is None else fit.values)
         slow = slow_error_of(problem, fit)
     # Channels that only the diagnosed recordings have stay as they were known before.
+    slow = _with_displacements_of(slow, predictor)
     belief = known_before(predictor)
     place = {c.name: index for index, c in enumerate(fit.coordinates)}
     rows = [index for index, c in enumerate(shared) if c.name in place]
@@ -285,6 +286,14 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
     problem = Problem(earlier, prior, slow, earlier.observations)
     own = EarlierReadings.about(problem, problem.fit((), fit.values, iterations=0))
     return Calibrated(after, replace(belief, earlier=own, begin=mean), slow, fit)
+
+
+def _with_displacements_of(slow: SlowError, predictor: Predictor) -> SlowError:
+    """With what is expected of displacements that it does not know: that of kelvins is none of theirs."""
+    known = {key for key, _, _ in slow.channels}
+    usual = expected_slow_error(predictor).channels
+    new = tuple(item for item in usual if item[0] < 0 and item[0] not in known)
+    return replace(slow, channels=(*slow.channels, *new))
 
 
 def _as_stated(before: Array, after: Array) -> Array:

@@ -56,10 +56,13 @@ class Told:
         ``as modelled``, ``leaving`` or ``left``.
     channel : str or None
         With the most evidence; None while as modelled.
-    departure : float or None, [K]
-        What the channel read last beyond what the machine, as it is known, should read.
+    departure : float or None, [K, µm]
+        What the channel read last beyond what the machine, as it is known, should read; of a displacement in
+        µm, but for the sensor's zero.
     evidence : float
         Largest sum over the level of an alarm.
+    displaced : bool
+        Whether the channel reads a displacement.
     """
 
     time: float
@@ -68,6 +71,7 @@ class Told:
     condition: str
     departure: float | None
     evidence: float
+    displaced: bool = False
 
 
 class WatchedMachine:
@@ -77,8 +81,8 @@ class WatchedMachine:
     ----------
     known : Calibrated
         What is known of the machine; only its own coordinates and temperatures at the start count.
-    white : (c,) ndarray, [K]
-        Noise of a single reading of each channel, rounding included.
+    white : (c,) ndarray, [K, µm]
+        Noise of a single reading of each channel, as :func:`white_noise` has it.
     width : float, [s]
         Readings are averaged over it.
     alarms : float
@@ -96,13 +100,16 @@ class WatchedMachine:
         self, run: ContinuedRun, known: Calibrated, white: Array, *, width: float, alarms: float
     ) -> None:
         self.run, self.slow, self.white, self.width = run, known.slow, white, width
+        self._alarms = alarms
         self.used = -np.inf
         self.coordinates, self._usual, self._prior = _own_part(known.belief)
         self.position, self._covariance = self._usual.copy(), self._prior.copy()
-        self.sums = CumulativeSums(len(white), MONTH / width / alarms, SOONER)
+        self.sums = self._new_sums()
         self.state = AS_MODELLED
         self._filter: InnovationFilter | None = None
         self._channels: tuple[str, ...] = ()
+        # Leading channels that are temperatures; the others are displacements.
+        self._kelvins = len(white)
         self._past: deque[tuple[float, float, float]] = deque(maxlen=REMEMBERED)
         self._time: float | None = None
         self._away = np.zeros(len(white))
@@ -110,18 +117,24 @@ class WatchedMachine:
         self.spread = 1.0
         self._numbers: deque[Array] = deque(maxlen=MOST_NUMBERS)
 
+    def _new_sums(self) -> CumulativeSums:
+        return CumulativeSums(len(self.white), MONTH / self.width / self._alarms, SOONER)
+
     def learn_spread(self, sound: Sequence[Recording]) -> None:
-        """Take the spread of innovations from recordings with nothing missing."""
+        """Take the spread of innovations from recordings with nothing missing, of whatever channels."""
         numbers = []
         for recording in sound:
             trial = copy.copy(self)
             trial.run = ContinuedRun(self.run.fast, self.run.effects)
-            trial.position, trial.sums = self.position.copy(), copy.deepcopy(self.sums)
+            trial.position, trial.white = self.position.copy(), white_noise(recording)
+            trial.sums, trial._away = trial._new_sums(), np.zeros(len(trial.white))
             trial._past, trial._numbers = deque(maxlen=REMEMBERED), deque(maxlen=MOST_NUMBERS)
             trial.follow(recording, to_end=True)
             numbers += trial._numbers
         if numbers:
-            self.spread = spread_of_sound(np.array(numbers))
+            most = max(map(len, numbers))
+            padded = [np.pad(row, (0, most - len(row)), constant_values=np.nan) for row in numbers]
+            self.spread = spread_of_sound(np.array(padded))
 
     # ------------------------------------------------------------------ coordinates
     @property
@@ -138,7 +151,12 @@ class WatchedMachine:
         self.coordinates = (*self.coordinates[:own], *starts)
         self.position = np.append(self.position[:own], np.zeros(len(starts)))
         self.run.restart()
-        self._filter = InnovationFilter(covariance, self.slow, len(self.white))
+        self._kelvins, every = piece.temperature_count, len(self.white)
+        slow = [
+            self.slow if channel < self._kelvins else self.slow.of(channel - every)
+            for channel in range(every)
+        ]
+        self._filter = InnovationFilter(covariance, slow, range(self._kelvins, every))
 
     # ------------------------------------------------------------------ following
     def pass_over(self, piece: Recording) -> None:
@@ -221,13 +239,16 @@ class WatchedMachine:
                 self._numbers.append(numbers)
                 self.sums.add(numbers / self.spread)
             read = np.isfinite(instants.residual[index])
-            self._away = np.where(read, instants.residual[index], self._away)
+            self._away = np.where(read, instants.residual[index] - self._filter.zeros, self._away)
             found.append(self._judge(time, words[index]))
         self._recentre(float(piece.times[-1] - piece.times[0]))
         return found
 
     def _judge(self, time: float, condition: str) -> Told:
-        evidence, out = self.sums.evidence, np.abs(self._filter.slow_errors) > STILL_OUT * self.slow.sigma
+        evidence, out = (
+            self.sums.evidence,
+            np.abs(self._filter.slow_errors) > STILL_OUT * self._filter.slow_sigma,
+        )
         if evidence.max() >= 1.0:
             self.state = LEFT
         elif self.state == LEFT:
@@ -243,6 +264,7 @@ class WatchedMachine:
             condition,
             float(self._away[worst]) if away else None,
             float(evidence[worst]),
+            away and worst >= self._kelvins,
         )
 
     def _recentre(self, elapsed: float) -> None:
@@ -270,6 +292,12 @@ def _own_part(belief: Belief) -> tuple[tuple[Coordinate, ...], Array, Array]:
     return tuple(belief.coordinates[i] for i in chosen), belief.mean[chosen], covariance
 
 
+def white_noise(recording: Recording) -> Array:
+    """White noise of a single reading of each channel, rounding included, (c,) K or µm."""
+    rounding = np.array([noise.resolution for noise in recording.noise]) / np.sqrt(12.0)
+    return np.hypot(recording.sigma, rounding)
+
+
 def long_gap(times: Array) -> float:
     """Distance of rows, s, over which a machine is not followed."""
     return max(LONG_GAP_SECONDS, LONG_GAP_STEPS * float(np.median(np.diff(times))))
@@ -282,14 +310,14 @@ class _Instants:
     Attributes
     ----------
     times : (k,) ndarray, [s]
-    residual : (k, c) ndarray, [K]
+    residual : (k, c) ndarray, [K, µm]
         Read less predicted; NaN where nothing was read.
-    slopes : (k, c, p) ndarray, [K]
+    slopes : (k, c, p) ndarray, [K, µm]
         Derivatives of the prediction to the coordinates.
     number : (k, c) ndarray
         Readings in each average.
     expected : (k,) ndarray, [K]
-        Predicted mean of the channels.
+        Predicted mean of the temperatures.
     """
 
     times: Array
@@ -320,7 +348,13 @@ class _Instants:
             residual[rows, channel] = item.values - expected[rows, channel]
             slopes[rows, channel] = item.at(told.sensitivity[:, channel]) * sigma
             number[rows, channel], times[rows, channel] = item.bins.number, item.bins.times
-        return cls(np.nanmean(times, axis=1), residual, slopes, number, np.nanmean(expected, axis=1))
+        mean = np.nanmean(times, axis=1)
+        warm = np.isfinite(expected[:, : piece.temperature_count])
+        known = warm.any(axis=1)
+        total = np.where(warm, expected[:, : piece.temperature_count], 0.0).sum(axis=1)
+        if known.any():
+            total = np.interp(mean, mean[known], total[known] / warm[known].sum(axis=1))
+        return cls(mean, residual, slopes, number, total)
 
 
 def _running(piece: Recording, run: ContinuedRun, times: Array) -> Array:

@@ -252,11 +252,19 @@ def _require_length(times: Array, source: str) -> None:
         )
 
 
-def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float | None = None) -> Recording:
+def align(
+    manifest: Manifest,
+    table: RawTable,
+    *,
+    source: str,
+    long_gap: float | None = None,
+    from_first: bool = True,
+) -> Recording:
     """Put a raw table on its grid of distinct stamps and flag its defects.
 
     Repeated stamps are merged: means of what they read, the last value of an
-    input that is held.
+    input that is held. Displacements count from their first reading, or else from the sensor's own zero,
+    which is the same in rows of one file that are read apart.
     """
     grid = _Grid(table.seconds)
     units = conversions(manifest)
@@ -323,7 +331,9 @@ def align(manifest: Manifest, table: RawTable, *, source: str, long_gap: float |
         defects=report,
         displacement_names=tuple(c.column for c in displaced),
         displacement_sensors=tuple(str(c.probe) for c in displaced),
-        displacements=_stack([_from_first(aligned[c.column]) for c in displaced], times),
+        displacements=_stack(
+            [_from_first(aligned[c.column]) if from_first else aligned[c.column] for c in displaced], times
+        ),
         displacement_sigma=np.array(
             [
                 c.sigma * units[c.column].scale

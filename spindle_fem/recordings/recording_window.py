@@ -145,7 +145,7 @@ class RecordingWindow:
     def recording(self) -> Recording | None:
         """The rows that are kept; None where fewer than two have a time, or no channel has a reading.
 
-        Inputs begin with their last reading before these rows.
+        Inputs begin with their last reading before these rows; displacements count from their sensor's zero.
         """
         rows = self._rows.copy()
         if np.unique(rows[:, 0]).size < 2:
@@ -167,7 +167,7 @@ class RecordingWindow:
             truncated=False,
         )
         try:
-            return align(self.manifest, table, source=str(self.data), long_gap=np.inf)
+            return align(self.manifest, table, source=str(self.data), long_gap=np.inf, from_first=False)
         except RecordingError:
             return None
 
@@ -198,5 +198,6 @@ def piece_of(recording: Recording, begin: int, stop: int) -> Recording:
         flags=recording.flags[rows],
         inputs=np.column_stack(inputs) if inputs else recording.inputs[rows],
         covariates=recording.covariates[rows],
+        displacements=recording.displacements[rows],
         segments=np.array([[0, stop - begin]], dtype=np.int64),
     )

@@ -15,11 +15,13 @@ from spindle_fem.definition.network_load import is_network_machine
 from spindle_fem.errors import BadInputError, RecordingError
 from spindle_fem.inference.continued_run import ContinuedRun
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
-from spindle_fem.inference.opened_machine import open_machine
+from spindle_fem.inference.opened_machine import open_machine, with_growth
 from spindle_fem.inference.predictor import LONGEST_BIN, STEP, Predictor
 from spindle_fem.inference.prepared_problem import Calibrated, calibrate
-from spindle_fem.inference.watched_machine import MONTH, Told, WatchedMachine
+from spindle_fem.inference.watched_machine import MONTH, Told, WatchedMachine, white_noise
+from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import Recording, read_recording
+from spindle_fem.recordings.displaced_readings import with_displacements
 from spindle_fem.recordings.faults_beside import manifest_for
 from spindle_fem.recordings.growing_file import follow_lines
 from spindle_fem.recordings.recordable_names import recordable_names
@@ -120,7 +122,8 @@ def watch_recording(
     ------
     dict
         ``time``, ``state``, ``channel``, ``condition``, ``false_alarms_per_month``, ``departure_K`` (of the
-        channel, by how much it reads too high) and ``evidence`` (1 raises an alarm).
+        channel, by how much it reads too high; ``departure_um`` of a displacement) and ``evidence`` (1
+        raises an alarm).
 
     Raises
     ------
@@ -181,6 +184,8 @@ def _begin(
     stop = int(np.searchsorted(first.times, first.times[0] + how.warm_up, side="right"))
     sound = [piece_of(first, 0, stop)] if how.warm_up else []
     opened = open_machine(machine, tuple(how.overrides), [first], [*calibration, *sound], progress=progress)
+    opened = with_growth(opened)
+    first, *sound = (_grown(item, opened.fast) for item in (first, *sound))
     run = ContinuedRun(opened.fast, opened.effects)
     earlier = None
     if opened.calibration:
@@ -188,11 +193,10 @@ def _begin(
         earlier = Predictor(opened.fast, opened.calibration, effects=opened.effects)
         earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
     known = calibrate(earlier, run.begins(piece_of(first, 0, first.times.size)))
-    rounding = np.array([noise.resolution for noise in first.noise]) / np.sqrt(12.0)
     watched = WatchedMachine(
         run,
         known,
-        np.hypot(first.sigma, rounding),
+        white_noise(first),
         width=_width(known, first, opened.is_network),
         alarms=how.alarms,
     )
@@ -200,6 +204,11 @@ def _begin(
     if how.warm_up:
         watched.pass_over(sound[0])
     return watched
+
+
+def _grown(recording: Recording, fast: FastModel) -> Recording:
+    """With displacements among the readings, as a diagnosis takes them: of machines with geometry."""
+    return with_displacements(recording) if fast.network is None else recording
 
 
 def _width(known: Calibrated, first: Recording, is_network: bool) -> float:
@@ -216,7 +225,7 @@ def _follow(watched: WatchedMachine, window: RecordingWindow, *, to_end: bool = 
     recording = _smooth(window)
     if recording is None:
         return []
-    found = watched.follow(recording, to_end=to_end)
+    found = watched.follow(_grown(recording, watched.run.fast), to_end=to_end)
     window.use(watched.used)
     return found
 
@@ -247,12 +256,14 @@ class _Teller:
 
     def _line(self, item: Told, window: RecordingWindow) -> dict[str, Any]:
         self._said = item
+        away = None if item.departure is None else round(item.departure, 3)
         return {
             "time": window.stamp(item.time),
             "state": item.state,
             "channel": item.channel,
             "condition": item.condition,
             "false_alarms_per_month": self._how.alarms,
-            "departure_K": None if item.departure is None else round(item.departure, 3),
+            "departure_K": None if away is None or item.displaced else away,
+            **({"departure_um": away} if away is not None and item.displaced else {}),
             "evidence": round(item.evidence, 3),
         }

@@ -108,7 +108,7 @@ def test_a_lasting_departure_is_found_and_left_again():
 def test_innovations_are_white_and_of_unit_spread():
     generator, slow, white = np.random.default_rng(7), SlowError(0.1, 1000.0), np.full(2, 0.05)
     count, apart = 4000, 60.0
-    filtered = InnovationFilter(np.array([[1.0]]), slow, 2)
+    filtered = InnovationFilter(np.array([[1.0]]), [slow, slow])
     slopes = np.array([[0.3], [-0.2]])
     errors, kept, unknown = np.zeros(2), np.exp(-apart / slow.time), generator.standard_normal()
     found = []
