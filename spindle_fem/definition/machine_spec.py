@@ -385,6 +385,12 @@ class MachineSpec(SpecModel):
         return coolant is not None and (coolant.pressure_limit, coolant.pump_curve) != (None, None)
 
     @property
+    def is_the_papers(self) -> bool:
+        """Whether its cooling or operation is marked P: only then are the paper's questions put to it."""
+        tables = (self.operation, self.channel, self.coolant)
+        return any("P" in table.marks.values() for table in tables if table is not None)
+
+    @property
     def circuits(self) -> tuple[StreamFilm, ...]:
         """Streams beside the channel: circuits, oil or air through bearings."""
         return tuple(film for film in self.film if isinstance(film, StreamFilm))

@@ -176,7 +176,10 @@ def _speed_table(content: Mapping[str, Any]) -> Table:
         fixed("matched, conductances fixed K", "fixed_max_K", 2),
         fixed("not matched K", "unmatched_max_K", 2),
     )
-    return table_of(fields, content["matched"]["speeds"], "Largest difference of any node to the elements.")
+    said = "Largest difference of any node to the elements."
+    for item in content["matched"].get("not_reached", ()):
+        said += f" At {item['speed_rpm']:.0f} rpm there is nothing to compare: {item['reason']}"
+    return table_of(fields, content["matched"]["speeds"], said)
 
 
 def _claim_blocks(claim: Mapping[str, Any]) -> list[Any]:

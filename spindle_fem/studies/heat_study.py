@@ -16,6 +16,7 @@ from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperat
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.heat_model import friction_model_names
+from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.bearings.roller_set import RollerSet
 from spindle_fem.units import ZERO_CELSIUS_K
 from spindle_fem.validity import CodedWarning, fold_warnings
@@ -111,10 +112,11 @@ def heat_study(
 def usual_speeds(spec: MachineSpec) -> tuple[float, ...]:
     """Nine speeds in steps of a sixth of the operating speed (of 3000 rpm where it is 0), rad/s.
 
-    The step has two digits in rpm.
+    The step has two digits in rpm. Speeds that no bearing of the machine reaches are left out.
     """
     step = float(f"{(spec.operation.speed / RPM or 3000.0) / STEPS_TO_OPERATION:.2g}")
-    return tuple(step * number * RPM for number in range(1, STEPS + 1))
+    speeds = (step * number * RPM for number in range(1, STEPS + 1))
+    return tuple(speed for speed in speeds if too_fast(spec, speed) is None)
 
 
 def _solved_temperatures(

@@ -131,11 +131,10 @@ def test_the_folder_is_complete_and_the_report_stands_alone(grid):
     assert "breaks through" in html
     assert "http" not in html.replace("http://www.w3.org/2000/svg", "")
     assert rebuild_sweep_report(folder).read_text() == html
-    assert {path.stem for path in (folder / "figures").glob("*.png")} >= {
-        "responses",
-        "film_maps",
-        "pump_maps",
-    }
+    pictures = {path.stem for path in (folder / "figures").glob("*.png")}
+    assert "responses" in pictures
+    # The paper's choice of its channel is no question of another machine.
+    assert not pictures & {"film_maps", "pump_maps"}
 
 
 @pytest.mark.usefixtures("unpictured")

@@ -62,7 +62,7 @@ def test_spread_in_a_ring_agrees_with_a_strip_on_a_slab(recorded):
         return build_machine_network(spec, refinement=8, assembly=coarse.assembly, lines=lines, bands=narrow)
 
     networks = [built(narrow) for narrow in ({}, bands)]
-    patches = [network.surfaces["F1.inner_raceway"] for network in networks]
+    patches = [network.raceway("F1", "inner") for network in networks]
     assert patches[1].area.sum() == pytest.approx(2.0 * np.pi * radius * 2.0 * half, rel=1e-6)
     # the ring alone: heat in through the face, out through the bore held at 0
     resistance = []

@@ -67,6 +67,7 @@ def test_the_line_is_where_each_model_leaves_laminar_flow(charts):
 
 def test_machine_without_a_channel_has_no_map():
     assert film_study(load_machine("uncooled")) == ()
+    assert film_study(load_machine("small_two_start")) == ()
 
 
 def test_limits_of_a_study_that_concern_the_pump():

@@ -8,7 +8,7 @@ network converges to the axisymmetric conduction problem.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,7 +104,8 @@ class MachineNetwork:
     Node order: solid nodes, balls, gap air, coolant along the flow.
     ``ball_nodes`` are the nodes of the ball rows; ``seats`` the nodes that each
     ring sits on, and the share of its seat at each; ``growth`` is there where
-    preload follows the fits.
+    preload follows the fits; ``narrow_raceways`` where balls and their heat
+    meet a part of a raceway only.
     """
 
     spec: MachineSpec
@@ -123,6 +124,7 @@ class MachineNetwork:
     ball_nodes: Mapping[str, int]
     seats: Mapping[str, tuple[NDArray[np.int64], Array]]
     growth: NetworkGrowth | None = None
+    narrow_raceways: Mapping[str, SurfacePatch] = field(default_factory=dict)
 
     @property
     def n_solid(self) -> int:
@@ -143,6 +145,11 @@ class MachineNetwork:
     def coolant_start(self) -> int:
         """First node of the coolant."""
         return self.air_start + sum(gap.n_bands for gap in self.gaps.values())
+
+    def raceway(self, bearing: str, side: str) -> SurfacePatch:
+        """Where balls meet the inner or outer raceway of a bearing; the oil wets the whole surface."""
+        name = f"{bearing}.{side}_raceway"
+        return self.narrow_raceways.get(name) or self.surfaces[name]
 
     def spread(self, place: str) -> Array:
         """Share of the heat of a part, segment or surface that each node takes up, (n,).
@@ -185,8 +192,8 @@ def build_machine_network(
         Of the same machine, where it is at hand.
     lines : (along z, along r), [m]
         More lines that a refined network is cut along.
-    bands : mapping of surface to (from, to), [m]
-        Surfaces that exchange heat on a part of their length only; lines must end it.
+    bands : mapping of raceway to (from, to), [m]
+        Raceways that balls meet on a part of their length only; lines must end it.
 
     Raises
     ------
@@ -237,7 +244,7 @@ def build_machine_network(
         name: surface_patch(faces, cells, partition, centres, conductivity)
         for name, faces in exposed_surfaces(cells).items()
     }
-    surfaces |= {name: surfaces[name].between(*span) for name, span in (bands or {}).items()}
+    narrow = {name: surfaces[name].between(*span) for name, span in (bands or {}).items()}
     gaps = {gap.name: _air_bands(spec, gap, surfaces, cells, partition, spans[gap.name]) for gap in spec.gap}
     coolant = None
     if spec.channel is not None:
@@ -269,6 +276,7 @@ def build_machine_network(
             for ring in (f"{bearing.name}.inner_ring", f"{bearing.name}.outer_ring")
         },
         growth=NetworkGrowth.of(spec, cells, partition) if grows(spec) else None,
+        narrow_raceways=narrow,
     )
 
 

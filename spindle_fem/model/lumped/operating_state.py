@@ -237,7 +237,7 @@ def _bearing(machine, group, name, heat: BearingHeat, links):
     spread[ball] = shares["balls"]
     ways = []
     for side, conductance in zip(("inner", "outer"), conductances, strict=True):
-        patch = machine.surfaces[f"{name}.{side}_raceway"]
+        patch = machine.raceway(name, side)
         part = patch.area / patch.area.sum()
         contact = conductance * part
         loss = 1.0 / (1.0 + contact * patch.resistance)
@@ -284,7 +284,7 @@ def _contact_faces(machine, friction: FrictionTables, heats, heat_to) -> list[Co
         for side, conductance, table in zip(
             ("inner", "outer"), made_with, friction.conductance[name], strict=True
         ):
-            patch = machine.surfaces[f"{name}.{side}_raceway"]
+            patch = machine.raceway(name, side)
             part = patch.area / patch.area.sum()
             faces.append(
                 ContactFaces(

@@ -16,10 +16,12 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementQuad2, FacetBasis, LinearForm, MeshQuad
 
+from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.model.lumped.cells import Faces, MeridianCells
 from spindle_fem.model.lumped.heat_laws import CoolantLaw
 from spindle_fem.model.lumped.machine_network import MachineNetwork, cells_of
+from spindle_fem.operation.circuits import CircuitMarch, wall_cells
 from spindle_fem.operation.coefficients import (
     ball_conductances,
     film_coefficient,
@@ -276,6 +278,9 @@ def _films(system: _Assembly, state: MachineNetworkState) -> list[tuple[Array, f
     network = state.network
     lost = []
     for film in network.machine.spec.film:
+        if isinstance(film, StreamFilm):
+            lost.append(_stream(system, state, film))
+            continue
         fluid = fluid_temperature(film, network.point.ambient_temperature)
         for surface in film.surface:
             wall = state.temperature[network.machine.surfaces[surface].node]
@@ -287,6 +292,32 @@ def _films(system: _Assembly, state: MachineNetworkState) -> list[tuple[Array, f
             system.load[: system.n_field] += fluid * vector
             lost.append((vector, fluid))
     return lost
+
+
+def _stream(system: _Assembly, state: MachineNetworkState, film: StreamFilm) -> tuple[Array, float]:
+    """A stream that its walls warm, eliminated: they exchange with its inlet and, past it, with each other.
+
+    Returns
+    -------
+    What each unknown's temperature above the inlet gives to it (n_field,) [W/K], and its inlet [K].
+    """
+    inlet = film.inlet_temperature
+    value, _ = film_coefficient(film, state.network.point, np.zeros(1), inlet)
+    walls = np.zeros((system.n_field, len(film.surface)))
+    for number, surface in enumerate(film.surface):
+        basis = _surface(system, surface)
+        local = np.full(basis.dx.shape, float(value[0]))
+        system.add(_exchange.assemble(basis, h=local))
+        walls[:, number] = _supply.assemble(basis, q=local)
+    conductance = walls.sum(axis=0)
+    warming = CircuitMarch.of(film, conductance, wall_cells(film)).warming
+    wetted = np.flatnonzero(walls.any(axis=1))
+    between = (walls[wetted] @ warming) @ (walls[wetted] / conductance).T
+    system.rows.append(np.repeat(wetted, len(wetted)))
+    system.columns.append(np.tile(wetted, len(wetted)))
+    system.values.append(-between.ravel())
+    system.load[: system.n_field] += inlet * (walls @ (1.0 - warming.sum(axis=1)))
+    return walls @ (1.0 - conductance @ warming / conductance), inlet
 
 
 def _gaps(system: _Assembly, state: MachineNetworkState) -> None:

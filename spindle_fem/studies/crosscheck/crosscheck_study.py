@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from spindle_fem import __version__
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.errors import BadInputError, GeometryError, SpecError
+from spindle_fem.errors import BadInputError, GeometryError, SpindleFemError
 from spindle_fem.model.lumped.machine_network import MachineNetwork, build_machine_network
 from spindle_fem.operation.bearing_heat import HeatModel
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -29,12 +29,13 @@ from spindle_fem.studies.crosscheck.gather_fields import gather_axisymmetric, ga
 from spindle_fem.studies.crosscheck.node_comparison import Comparison, compare
 from spindle_fem.studies.crosscheck.paper_claim import applies, check_claim, element_result
 from spindle_fem.studies.crosscheck.regions import NodeRegions, build_regions
+from spindle_fem.studies.heat_study import usual_speeds
 from spindle_fem.units import ZERO_CELSIUS_K
 
 SCHEMA = "spindle-fem/crosscheck/1"
 RPM = np.pi / 30.0
-TEST_SPEEDS_RPM = (500.0, 1500.0, 4500.0)
-EXPORT_SPEEDS_RPM = tuple(float(value) for value in range(500, 4501, 500))
+# Places among the usual speeds: a sixth, a half and one and a half of the operating speed.
+TEST_SPEEDS = (0, 2, 8)
 REFINEMENTS = (2, 4, 8)
 
 Progress = Callable[[str], None]
@@ -71,17 +72,9 @@ def crosscheck(spec: MachineSpec, tell: Progress = lambda stage: None) -> Crossc
 
     Raises
     ------
-    SpecError
-        A machine with streams beside its channel.
     SpindleFemError
         A model that has no solution.
     """
-    if spec.circuits:
-        raise SpecError(
-            f"film.{spec.circuits[0].name}",
-            "is a stream beside the channel, which crosscheck does not take apart node by node.",
-            "Leave it out (remove = true in a definition on this one's base; oil: the set's lubrication).",
-        )
     point = OperatingPoint.of(spec)
     tell("network")
     started = time.perf_counter()
@@ -103,7 +96,7 @@ def crosscheck(spec: MachineSpec, tell: Progress = lambda stage: None) -> Crossc
     convergence = _convergence(network, state, point, heat_model)
     tell("flux matching")
     matched = match_fluxes(network, [element_state(prepared, coupled, point, regions)], heat_model)
-    speeds = _speeds(prepared, coupled, regions, matched, state, heat_model, tell)
+    speeds, not_reached = _speeds(prepared, coupled, regions, matched, state, heat_model, tell)
     claim = None
     if applies(spec):
         claim = _claim(spec, prepared, coupled, tell)
@@ -139,6 +132,7 @@ def crosscheck(spec: MachineSpec, tell: Progress = lambda stage: None) -> Crossc
         "convergence": convergence,
         "matched": {
             "speeds": speeds,
+            "not_reached": not_reached,
             "heat_W": {name: float(value) for name, value in matched.matched.heat.items()},
             "nodes": matched.n_nodes,
             "links": len(matched.factor),
@@ -149,8 +143,7 @@ def crosscheck(spec: MachineSpec, tell: Progress = lambda stage: None) -> Crossc
         "claim": claim,
         "timing_s": timing,
     }
-    export_speeds = sorted({*EXPORT_SPEEDS_RPM, point.speed / RPM})
-    points = tuple(replace(point, speed=speed * RPM) for speed in export_speeds)
+    points = tuple(replace(point, speed=speed) for speed in _with(point.speed, usual_speeds(spec)))
     return Crosscheck(content, comparison, study, matched, points, heat_model)
 
 
@@ -265,30 +258,40 @@ def _speeds(
     state: MachineNetworkState,
     heat_model: HeatModel,
     tell: Progress,
-) -> list[dict[str, float]]:
-    """Matched and plain network against the elements at speeds that were not fitted."""
+) -> tuple[list[dict[str, float]], list[dict[str, Any]]]:
+    """Both networks against the elements at speeds that were not fitted; and speeds without a state."""
     point, n = matched.matched.point, matched.n_nodes
-    rows = []
-    for speed in sorted({*TEST_SPEEDS_RPM, point.speed / RPM}):
-        if abs(speed * RPM - point.speed) < 1.0e-9:
+    usual = usual_speeds(prepared.spec)
+    rows, not_reached = [], []
+    for speed in _with(point.speed, [usual[place] for place in TEST_SPEEDS if place < len(usual)]):
+        if speed == point.speed:
             own, plain = matched.matched, state
         else:
-            tell(f"elements at {speed:.0f} rpm")
-            at = replace(point, speed=speed * RPM)
-            own = element_state(
-                prepared, solve_coupled(prepared, at, coupled.solution.temperature), at, regions
-            )
-            plain = solve_machine_network(state.network.machine, at, heat_model=heat_model)
+            tell(f"elements at {speed / RPM:.0f} rpm")
+            at = replace(point, speed=speed)
+            try:
+                own = element_state(
+                    prepared, solve_coupled(prepared, at, coupled.solution.temperature), at, regions
+                )
+                plain = solve_machine_network(state.network.machine, at, heat_model=heat_model)
+            except SpindleFemError as error:
+                not_reached.append({"speed_rpm": speed / RPM, "reason": str(error)})
+                continue
         moving = matched.steady(own.point, own.heat, matched.conductance(own.point, heat_model))
         rows.append(
             {
-                "speed_rpm": float(speed),
+                "speed_rpm": speed / RPM,
                 "matched_max_K": _largest(moving, own.temperature[:n]),
                 "fixed_max_K": _largest(matched.steady(own.point, own.heat), own.temperature[:n]),
                 "unmatched_max_K": _largest(plain.temperature[:n], own.temperature[:n]),
             }
         )
-    return rows
+    return rows, not_reached
+
+
+def _with(own: float, speeds: Sequence[float]) -> list[float]:
+    """Speeds and a machine's own one, in order; one that differs by rounding only is the own one."""
+    return sorted({own, *(speed for speed in speeds if abs(speed - own) > 1.0e-6 * own)})
 
 
 def _claim(spec: MachineSpec, prepared: PreparedMachine, coupled: Any, tell: Progress) -> Mapping[str, Any]:

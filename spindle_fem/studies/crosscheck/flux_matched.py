@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from spindle_fem.model.lumped.heat_laws import CoolantLaw, WallFilmLaw
+from spindle_fem.model.lumped.heat_laws import CircuitLaw, CoolantLaw, WallFilmLaw
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.model.lumped.operating_state import operate
 from spindle_fem.model.lumped.thermal_network import link_matrix
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.coefficients import fluid_temperature
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.source_terms import source_heat
 from spindle_fem.solvers.coupled_steady import CoupledState
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.studies.crosscheck.node_comparison import fem_flows
@@ -36,6 +37,8 @@ FACTOR_RANGE = (0.02, 50.0)
 MATCHED_WEIGHT, OTHER_WEIGHT, PRIOR_WEIGHT = 1.0e4, 3.0, 1.0e-1
 TRUSTED_DIFFERENCE = 0.3
 TRUSTED_RATIO = (0.2, 5.0)
+# Of the largest conductance of a stream's walls; walls that it joins by less are not linked.
+SMALLEST_SHARE = 1.0e-3
 RELIEF_ROUNDS = 4
 RELIEF_RESIDUAL = 1.0e-3
 
@@ -48,7 +51,7 @@ class ElementState:
     ----------
     temperature : (n,) ndarray, [K]
         Of every network node; coolant entries are not used.
-    heat : mapping of bearing to float, [W]
+    heat : mapping of bearing, and of source, to float, [W]
     around : mapping of bearing to BearingTemperatures
     flows : mapping
         As :func:`fem_flows` gives them.
@@ -72,16 +75,16 @@ class MatchedNetwork:
     node_names : tuple of str
         Of the machine's network without its coolant.
     boundary_names : tuple of str
-        ``ambient``, fluids of films with a temperature of their own,
-        ``coolant_inlet``.
+        ``ambient``, fluids of films with a temperature of their own and of
+        streams at their inlets, ``coolant_inlet``.
     first, second : (m,) int64 ndarray
         Ends; boundaries follow nodes.
     factor : (m,) ndarray, [-]
         On the network's own conductance.
     base : (m,) ndarray, [W/K]
         That conductance at the matched state.
-    spread : (n, n_bearings) ndarray, [-]
-        Where each bearing's heat goes.
+    spread : (n, n_heated) ndarray, [-]
+        Where the heat of each bearing, then of each source, goes.
     coolant_rate : float, [W/K]
         Mass flow times heat capacity; 0 without coolant.
     """
@@ -108,9 +111,9 @@ class MatchedNetwork:
         return self.machine.capacity[: self.n_nodes]
 
     @property
-    def bearings(self) -> tuple[str, ...]:
-        """Names in the order of ``spread``."""
-        return tuple(self.machine.ball_nodes)
+    def heated_by(self) -> tuple[str, ...]:
+        """Bearings and sources in the order of ``spread``."""
+        return _heated_by(self.machine)
 
     def boundary_temperature(self, point: OperatingPoint) -> Array:
         """Temperature of every boundary at an operating point, (b,) [K]."""
@@ -128,9 +131,9 @@ class MatchedNetwork:
     def steady(
         self, point: OperatingPoint, heat: Mapping[str, float], conductance: Array | None = None
     ) -> Array:
-        """Node temperatures for given friction heat [W], (n,) [K]."""
+        """Node temperatures for given heat of bearings and sources [W], (n,) [K]."""
         matrix, to_boundary = self.matrices(self.factor * self.base if conductance is None else conductance)
-        power = self.spread @ np.array([heat[name] for name in self.bearings])
+        power = self.spread @ np.array([heat[name] for name in self.heated_by])
         return np.linalg.solve(matrix, power + to_boundary @ self.boundary_temperature(point))
 
     def matrices(self, conductance: Array) -> tuple[Array, Array]:
@@ -151,11 +154,16 @@ def element_state(
     return ElementState(
         point=point,
         temperature=node_temperatures(regions, prepared, coupled),
-        heat={name: heat.total for name, heat in coupled.loads.bearing_heat.items()},
+        heat={name: heat.total for name, heat in coupled.loads.bearing_heat.items()}
+        | {source.name: float(source_heat(source, point.inputs)) for source in prepared.spec.source},
         around=around,
         flows=fem_flows(prepared, coupled, regions.machine),
         coolant_outlet=float("nan") if march is None else march.march.march.mixed_outlet_temperature,
     )
+
+
+def _heated_by(machine: MachineNetwork) -> tuple[str, ...]:
+    return (*machine.ball_nodes, *(source.name for source in machine.spec.source))
 
 
 def _boundary_values(machine: MachineNetwork, names: Sequence[str], point: OperatingPoint) -> Array:
@@ -183,8 +191,8 @@ def base_conductances(
 ) -> dict[tuple[int, int], float]:
     """Conductance between nodes, and nodes and boundaries, as the network has it, W/K.
 
-    Coolant cells count as the boundary ``coolant_inlet``; films that follow
-    the wall are taken at the given temperatures.
+    Coolant cells count as the boundary ``coolant_inlet``, a stream as its inlet and links between its
+    walls; films that follow the wall are taken at the given temperatures.
     """
     network = operate(machine, point, heat_model, around=around)
     n = machine.coolant_start
@@ -222,15 +230,39 @@ def base_conductances(
             value = law.conductances(law.coefficients(full)[0])[0]
             for node, g in zip(law.patch.node.tolist(), value.tolist(), strict=True):
                 add(node, int(law.nodes[0]), g)
+        elif isinstance(law, CircuitLaw):
+            to_inlet, between = _stream_conductances(law)
+            for node, g in to_inlet.items():
+                key = (node, place[_film_boundary(machine, law.name)])
+                found[key] = found.get(key, 0.0) + g
+            for pair, g in between.items():
+                add(*pair, g)
     return found
 
 
-def _film_of(machine: MachineNetwork, surface: str):
-    return next(film for film in machine.spec.film if surface in film.surface)
+def _stream_conductances(law: CircuitLaw) -> tuple[dict[int, float], dict[tuple[int, int], float]]:
+    """What a stream amounts to between its walls and its inlet, and between walls past it, W/K.
+
+    What warms a wall downstream does not cool the one upstream; a link does both, with half of it.
+    """
+    nodes, number = np.unique(law.patch.node, return_inverse=True)
+    passed = np.zeros((len(nodes), len(nodes)))
+    np.add.at(passed, (number[:, None], number[None, :]), law.conductance[:, None] * law.warming)
+    own = np.bincount(number, law.conductance)
+    to_inlet = dict(zip(nodes.tolist(), (own - passed.sum(axis=1)).tolist(), strict=True))
+    mean = 0.5 * (passed + passed.T)
+    pairs = np.argwhere(np.triu(mean > SMALLEST_SHARE * own.max(), 1))
+    return to_inlet, {(int(nodes[a]), int(nodes[b])): float(mean[a, b]) for a, b in pairs}
 
 
-def _film_boundary(machine: MachineNetwork, surface: str) -> str:
-    film = _film_of(machine, surface)
+def _film_of(machine: MachineNetwork, name: str):
+    """The film of a surface, or the stream of that name."""
+    streams = {film.name: film for film in machine.spec.circuits}
+    return streams.get(name) or next(film for film in machine.spec.film if name in film.surface)
+
+
+def _film_boundary(machine: MachineNetwork, name: str) -> str:
+    film = _film_of(machine, name)
     return "ambient" if film.temperature == "ambient" else f"{film.name}.fluid"
 
 
@@ -288,7 +320,7 @@ def match_fluxes(
     both = [
         np.concatenate([s.temperature[:n], _boundary_values(machine, boundaries, s.point)]) for s in states
     ]
-    heats = [spread @ np.array([state.heat[name] for name in machine.ball_nodes]) for state in states]
+    heats = [spread @ np.array([state.heat[name] for name in _heated_by(machine)]) for state in states]
     bypass = _bypass(machine, network, matched)
     for _ in range(RELIEF_ROUNDS):
         pairs = sorted(bases[0])
@@ -390,26 +422,39 @@ def _conducts(pair, flux, state: ElementState, boundaries, machine: MachineNetwo
 
 
 def _heat_spread(machine: MachineNetwork, network) -> Array:
-    """Share of each bearing's heat that enters each node, (n, n_bearings)."""
-    spread = np.zeros((machine.coolant_start, len(machine.ball_nodes)))
+    """Share of the heat of each bearing, then of each source, that enters each node, (n, n_heated)."""
+    n, sources = machine.coolant_start, machine.spec.source
+    spread = np.zeros((n, len(machine.ball_nodes) + len(sources)))
     for column, (name, ball) in enumerate(machine.ball_nodes.items()):
         shares = network.heat_to[name]
         spread[ball, column] += shares["balls"]
         for side, way in zip(("inner", "outer"), network.raceways[name], strict=True):
-            area = np.bincount(
-                machine.surfaces[f"{name}.{side}_raceway"].node,
-                machine.surfaces[f"{name}.{side}_raceway"].area,
-            )[way.nodes]
+            patch = machine.raceway(name, side)
+            area = np.bincount(patch.node, patch.area)[way.nodes]
             spread[way.nodes, column] += shares[side] * area / area.sum() - way.bypass
             spread[ball, column] += float(way.bypass.sum())
+    for column, source in enumerate(sources, len(machine.ball_nodes)):
+        spread[:, column] = machine.spread(source.place)[:n]
     return spread
 
 
 def _bypass(machine: MachineNetwork, network, state: ElementState) -> dict[tuple[int, int], float]:
-    """Heat of each ball link that the network sends past it, straight from raceway to balls, W."""
+    """Heat of links that goes beside the flux the elements have there, W.
+
+    What the network sends past a ball link, straight from raceway to balls; what passes between a
+    stream's walls, which the elements have as heat to and from the stream.
+    """
     given: dict[tuple[int, int], float] = {}
     for name, ball in machine.ball_nodes.items():
         for way in network.raceways[name]:
             for node, share in zip(way.nodes.tolist(), way.bypass.tolist(), strict=True):
                 given[node, ball] = given.get((node, ball), 0.0) + share * state.heat[name]
+    boundaries = _boundary_names(machine)
+    for law in network.laws:
+        if isinstance(law, CircuitLaw):
+            fluid = machine.coolant_start + boundaries.index(_film_boundary(machine, law.name))
+            for (a, b), g in _stream_conductances(law)[1].items():
+                heat = g * float(state.temperature[a] - state.temperature[b])
+                for key, part in (((a, fluid), heat), ((b, fluid), -heat), ((a, b), -heat)):
+                    given[key] = given.get(key, 0.0) + part
     return given

@@ -15,6 +15,7 @@ from spindle_fem.definition.network_load import validate_network_machine, write_
 from spindle_fem.operation.bearing_heat import HeatModel
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.studies.crosscheck.flux_matched import MatchedNetwork
+from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 STATE_SPACE_SCHEMA = "spindle-fem/state-space/1"
@@ -28,7 +29,7 @@ class StateSpace:
     Attributes
     ----------
     states, inputs, outputs : tuple of str
-        Inputs are ``heat.<bearing>`` [W] and boundary temperatures [K];
+        Inputs are ``heat.<bearing>`` and ``heat.<source>`` [W], and boundary temperatures [K];
         outputs the node temperatures [K] and ``coolant_outlet`` [K].
     """
 
@@ -63,7 +64,7 @@ def state_space(network: MatchedNetwork, conductance: Array | None = None) -> St
         feed = np.zeros(b.shape[1])
         feed[network.spread.shape[1] + boundaries.index("coolant_inlet")] = 1.0 - row.sum()
         c, d, outputs = np.vstack([c, row]), np.vstack([d, feed]), (*outputs, "coolant_outlet")
-    inputs = (*(f"heat.{name}" for name in network.bearings), *boundaries)
+    inputs = (*(f"heat.{name}" for name in network.heated_by), *boundaries)
     return StateSpace(network.node_names, inputs, tuple(outputs), -matrix * inverse, b, c, d)
 
 
@@ -134,19 +135,20 @@ def network_toml(network: MatchedNetwork) -> str:
     values = network.boundary_temperature(network.matched.point)
     for name, value in zip(network.boundary_names, values, strict=True):
         driven = name in ("ambient", "coolant_inlet")
-        boundary.append({"name": name, "temperature": name if driven else f"{value - 273.15!r} degC"})
+        fixed = f"{float(value) - ZERO_CELSIUS_K!r} degC"
+        boundary.append({"name": name, "temperature": name if driven else fixed})
     links = [
         {"between": [names[a], names[b]], "conductance": f"{float(value)!r} W/K"}
         for a, b, value in zip(network.first, network.second, g, strict=True)
         if value > 0.0
     ]
-    node, bearing = np.nonzero(network.spread)
+    node, heated_by = np.nonzero(network.spread)
     content: dict[str, Any] = {
         "schema": "spindle-fem/machine/1",
         "name": f"{network.machine.spec.name} reduced",
         "description": (
             "Conductances by flux matching to the finite elements at "
-            f"{network.matched.point.speed / RPM:.0f} rpm; inputs heat.<bearing> in W."
+            f"{network.matched.point.speed / RPM:.0f} rpm; inputs heat.<bearing> and heat.<source> in W."
         ),
         "initial": "ambient",
         "network": {
@@ -159,10 +161,10 @@ def network_toml(network: MatchedNetwork) -> str:
             "source": [
                 {
                     "node": network.node_names[n],
-                    "input": f"heat.{network.bearings[b]}",
+                    "input": f"heat.{network.heated_by[b]}",
                     "gain": f"{float(network.spread[n, b])!r} W/W",
                 }
-                for n, b in zip(node, bearing, strict=True)
+                for n, b in zip(node, heated_by, strict=True)
             ],
         },
     }

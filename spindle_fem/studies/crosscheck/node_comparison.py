@@ -35,7 +35,7 @@ class LinkComparison:
     link : str
         ``first|second``; for a film, ``node|surface``.
     kind : str
-        solid, balls, gap.<name>, coolant, or the name of a film's surface.
+        solid, balls, gap.<name>, coolant, or the name of a film's surface or of a stream.
     network, fem : float, [W]
     surface : str
         What the flux was integrated over.
@@ -121,7 +121,7 @@ def fem_flows(
 ) -> dict[tuple[int, int | str, str], tuple[float, str]]:
     """Heat of the finite-element field along every link of a network, W.
 
-    Keys are (first, second node or film surface, kind).
+    Keys are (first, second node or film surface, kind); all walls of a stream together go by its name.
     """
     temperature = coupled.solution.temperature
     flows: dict[tuple[int, int | str, str], tuple[float, str]] = {}
@@ -171,6 +171,7 @@ def _surface_flows(prepared, coupled, machine, add) -> None:
             behind[surface] = facet_nodes(prepared, machine, mesh.surfaces[surface], part)
         return behind[surface]
 
+    stream_of = {name: film.name for film in machine.spec.circuits for name in film.surface}
     wetted = set(prepared.builder.cells.surfaces) if prepared.builder.cells is not None else set()
     for surface, film in coupled.loads.films.items():
         rows = operators.surface_rows[surface]
@@ -181,9 +182,10 @@ def _surface_flows(prepared, coupled, machine, add) -> None:
             for a, b, value in _summed(nodes_of(surface), _coolant_nodes(prepared, machine, surface), heat):
                 add(a, b, "coolant", value, surface)
         else:
+            taker = stream_of.get(surface, surface)
             for node, value in enumerate(np.bincount(nodes_of(surface), heat, machine.n_solid)):
                 if value:
-                    add(node, surface, surface, float(value), surface)
+                    add(node, taker, taker, float(value), taker)
     lumped = dict(
         zip(coupled.solution.problem.lumped_names, coupled.solution.lumped_temperature, strict=True)
     )

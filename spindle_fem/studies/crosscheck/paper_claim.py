@@ -129,8 +129,13 @@ def reynolds_number(spec: MachineSpec) -> float:
 
 
 def applies(spec: MachineSpec) -> bool:
-    """Whether the claim is testable on a machine: bearings inside a cooling channel."""
-    return spec.channel is not None and spec.coolant is not None and bool(spec.bearing_set)
+    """Whether the claim is testable on a machine: the paper's, with bearings inside a cooling channel."""
+    return (
+        spec.is_the_papers
+        and spec.channel is not None
+        and spec.coolant is not None
+        and bool(spec.bearing_set)
+    )
 
 
 def check_claim(

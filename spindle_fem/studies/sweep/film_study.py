@@ -131,11 +131,11 @@ def film_study(spec: MachineSpec) -> tuple[FilmChart, ...]:
     Returns
     -------
     tuple of FilmChart
-        Empty for a machine without a channel.
+        Empty for a machine that is not the paper's or has no channel.
 
     Source: Wu & Tan (2016), Adv. Mech. Eng. 8(8), Figure 22 and its optimum.
     """
-    if spec.channel is None:
+    if spec.channel is None or not spec.is_the_papers:
         return ()
     channel, coolant = spec.channel, coolant_by_name(spec.coolant.fluid)
     section = section_of(channel)
