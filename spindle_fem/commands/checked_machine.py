@@ -14,6 +14,7 @@ from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFem
 
 if TYPE_CHECKING:
     from spindle_fem.definition.effect_entries import EffectEntry
+    from spindle_fem.definition.load import Readable
     from spindle_fem.definition.machine_spec import MachineSpec
     from spindle_fem.definition.network_tables import NetworkMachineSpec
     from spindle_fem.recordings.align import Recording
@@ -34,7 +35,7 @@ def recording_of(
 def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:
     """Machine whose parts fit together; faults of its tables, geometry and effects at once."""
     from spindle_fem.definition.load import examine_machine
-    from spindle_fem.machine.geometry.assembly import build_assembly
+    from spindle_fem.machine.geometry.assembly import build_assembly, require_readable_geometry
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
     from spindle_fem.operation.assembled_sets import assembled_set, require_known_friction
     from spindle_fem.operation.operating_limits import require_possible_operation
@@ -73,8 +74,11 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
         if spec.heat is not None:
             require_known_friction(spec)
 
+    def can_run(spec: MachineSpec, _: Readable) -> None:
+        require_possible_operation(spec)
+
     checks = (fits_together, require_possible_operation, rubs_by_a_known_law, has_possible_effects)
-    return load_machine(machine, overrides, checks=checks)
+    return load_machine(machine, overrides, checks=checks, partly=(require_readable_geometry, can_run))
 
 
 _ENTRY = re.compile(r"(?:^|: )effect\[(\d+)\]")

@@ -96,9 +96,10 @@ def _width_faults(spec: MachineSpec, group: BearingSet) -> Iterator[SpindleFemEr
 def _ball_set_faults(group: BearingSet) -> Iterator[SpindleFemError]:
     where = f"bearing_set.{group.name}"
     if "preload" not in group.model_fields_set:
-        yield SpecError(
-            f"{where}.preload", "is missing.", 'Allowed: a quantity such as "500 N", at least 0 N.'
+        allowed = (
+            'Allowed: a quantity such as "500 N", at least 0 N; light, medium or heavy of types that ship.'
         )
+        yield SpecError(f"{where}.preload", "is missing.", allowed)
     for bearing in group.bearing:
         if bearing.takes_thrust is None:
             yield SpecError(

@@ -385,6 +385,10 @@ def _factors(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]
 
 
 def _probes(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
+    # A circuit, or a set that makes streams, whose own fault is told.
+    unread = list(declared.names["film"]) if "film" in declared.unsound else []
+    if "bearing_set" in declared.unsound:
+        unread += [f"{name}.lubrication" for name in declared.names["bearing"]]
     for probe in spec.probe:
         if probe.kind == "coolant_outlet" and "coolant" not in declared.tables:
             yield SpecError(
@@ -393,7 +397,7 @@ def _probes(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
                 "Drop it, or add one.",
             )
         names = [film.name for film in spec.circuits]
-        if probe.circuit is not None and probe.circuit not in names:
+        if probe.circuit is not None and probe.circuit not in (*names, *unread):
             yield _unknown(f"probe.{probe.name}.circuit", probe.circuit, "circuit", names)
         if probe.part is not None and probe.part not in declared.parts:
             yield _unknown(f"probe.{probe.name}.part", probe.part, "part", declared.parts)

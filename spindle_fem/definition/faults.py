@@ -90,17 +90,17 @@ def _faults_of(item: Any, model: type[BaseModel], content: Any) -> list[Fault]:
     if kind == "faults":
         return list(context["faults"])
     if kind == "extra_forbidden":
-        table_shape, table = _walk(model, item["loc"][:-1], content)
+        table_shape, table = walk_to(model, item["loc"][:-1], content)
         allowed = fields_of(table_shape.models, table)
         return [Fault("", "unknown key.", did_you_mean(str(item["loc"][-1]), allowed), "UnknownKeyError")]
     if kind == "missing":
         return [Fault("", "is missing.", _expected(model, item["loc"], content))]
     if kind == "literal_error":
-        shape, _ = _walk(model, item["loc"], content)
+        shape, _ = walk_to(model, item["loc"], content)
         allowed = [str(value) for value in literal_values(shape.annotation)]
         return [Fault("", f"{_shown(given)} is not allowed.", did_you_mean(str(given), allowed))]
     if kind in ("union_tag_invalid", "union_tag_not_found"):
-        shape, table = _walk(model, item["loc"], content)
+        shape, table = walk_to(model, item["loc"], content)
         kinds = [
             str(value)
             for one in shape.models
@@ -121,8 +121,8 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def _walk(model: type[BaseModel], location: Location, content: Any) -> tuple[Shape, Any]:
-    """Shape and raw value at a location."""
+def walk_to(model: type[BaseModel], location: Location, content: Any) -> tuple[Shape, Any]:
+    """Shape and raw value at one of pydantic's locations."""
     shape, node = Shape("table", (model,)), content
     for item in location:
         if isinstance(item, int):
@@ -142,7 +142,7 @@ def _walk(model: type[BaseModel], location: Location, content: Any) -> tuple[Sha
 
 
 def _expected(model: type[BaseModel], location: Location, content: Any) -> str:
-    shape, _ = _walk(model, location, content)
+    shape, _ = walk_to(model, location, content)
     if shape.kind == "list":
         inner = shape_of(shape.inner)
         entries = "tables" if inner.kind == "table" else "values"

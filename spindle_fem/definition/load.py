@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,8 @@ from spindle_fem.definition.inherit import (
     without_none,
 )
 from spindle_fem.definition.machine_spec import MACHINE_SCHEMA, MachineSpec
-from spindle_fem.definition.schema import annotation_of
+from spindle_fem.definition.mended_tables import mended
+from spindle_fem.definition.schema import annotation_of, names_of
 from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError, did_you_mean
 
 __all__ = [
@@ -144,6 +146,62 @@ def _merged(layers: Iterable[Layer]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, slots=True)
+class Readable:
+    """What of a faulty machine's geometry can be relied on.
+
+    Attributes
+    ----------
+    parts : frozenset of str
+        Parts and rings as the file means them.
+    surfaces : frozenset of str
+        Surfaces that the file names, and walls of circuits: not those that rules give.
+    every_part : bool
+        Whether no part and no bearing is missing or faulty.
+    channel : bool
+        Whether the channel is as the file means it.
+    """
+
+    parts: frozenset[str]
+    surfaces: frozenset[str]
+    every_part: bool
+    channel: bool
+
+    @classmethod
+    def of(
+        cls,
+        spec: MachineSpec,
+        written: Mapping[str, Any],
+        content: Mapping[str, Any],
+        faults: Iterable[SpindleFemError],
+    ) -> Readable:
+        """Of sound tables, the file's tables before and after completion, and the faults found so far."""
+        places = [fault.where for fault in faults if not fault.where.endswith(_NO_GEOMETRY)]
+        declared = Declared.of(content)
+        owners = {part.name: (f"part.{part.name}",) for part in spec.part}
+        for group, bearing in spec.bearings:
+            kind = group.type_name(bearing)
+            if kind in spec.bearing_types:
+                paths = (f"bearing_set.{group.name}.bearing.{bearing.name}", f"bearing_types.{kind}")
+                owners |= {f"{bearing.name}.{side}_ring": paths for side in ("inner", "outer")}
+        sound = {
+            name
+            for name, paths in owners.items()
+            if not any(_is_inside(where, path) for where in places for path in paths)
+        }
+        walls = {name for film in spec.circuits for name in film.surface}
+        return cls(
+            frozenset(sound),
+            frozenset({*names_of(written.get("surface")), *walls}),
+            set(declared.parts) == sound,
+            spec.channel is not None and not any(_is_inside(where, "channel") for where in places),
+        )
+
+
+# Keys whose faults leave a part or bearing where it is.
+_NO_GEOMETRY = (".material", ".preload", ".takes_thrust", ".rotating")
+
+
+@dataclass(frozen=True, slots=True)
 class Examination:
     """Content of a definition, sound or not.
 
@@ -158,6 +216,8 @@ class Examination:
         Top-level keys with a fault inside, whose entries ``spec`` may lack.
     can_be_built : bool
         Whether all that the geometry needs is sound, whatever else is not.
+    readable : Readable or None
+        What of the geometry can be relied on where it cannot be built.
     assumed : tuple of Assumption
         What the file leaves out and rules gave.
     """
@@ -167,6 +227,7 @@ class Examination:
     unsound: frozenset[str] = frozenset()
     can_be_built: bool = False
     assumed: tuple[Assumption, ...] = ()
+    readable: Readable | None = None
 
 
 def examine(content: Mapping[str, Any], layers: Iterable[Layer] | str = "machine") -> Examination:
@@ -184,20 +245,24 @@ def examine(content: Mapping[str, Any], layers: Iterable[Layer] | str = "machine
     fault = _schema_fault(content)
     if fault is not None:
         return Examination(None, (relabelled(fault, layers),))
+    written = content
     content, assumed = complete(content)
     try:
         spec, faults = MachineSpec.model_validate(content), []
     except ValidationError as error:
         faults = validation_faults(error, "", MachineSpec, content)
-        spec = _sound_tables(content, error)
+        spec = _read_around(content, error)
     keys = [field.alias or name for name, field in MachineSpec.model_fields.items()]
     unsound = frozenset(key for key in keys if any(_is_inside(fault.where, key) for fault in faults))
-    between = find_faults(spec, Declared.of(content, unsound))
+    told = [fault.where for fault in faults]
+    found = find_faults(spec, Declared.of(content, unsound))
+    between = [fault for fault in found if not any(_is_inside(fault.where, where) for where in told)]
     can_be_built = not unsound & _GEOMETRY_KEYS and not any(
         _concerns_geometry(fault.where) for fault in between
     )
+    readable = None if can_be_built else Readable.of(spec, written, content, (*faults, *between))
     located = tuple(relabelled(fault, layers) for fault in (*faults, *between))
-    return Examination(spec, located, unsound, can_be_built, assumed)
+    return Examination(spec, located, unsound, can_be_built, assumed, readable)
 
 
 _GEOMETRY_KEYS = frozenset(
@@ -234,6 +299,15 @@ def _schema_fault(content: Mapping[str, Any]) -> SpindleFemError | None:
             "Only simulate and diagnose take one; this needs [[part]].",
         )
     return None
+
+
+def _read_around(content: Mapping[str, Any], error: ValidationError) -> MachineSpec:
+    """The machine without its faulty values, or else without the tables that they leave unreadable."""
+    content = mended(content, error, MachineSpec)
+    try:
+        return MachineSpec.model_validate(content)
+    except ValidationError as left:
+        return _sound_tables(content, left)
 
 
 def _sound_tables(content: Mapping[str, Any], error: ValidationError) -> MachineSpec:
@@ -312,7 +386,10 @@ def examine_machine(machine: str | Path, overrides: Iterable[str] = ()) -> Exami
 
 
 def load_machine(
-    machine: str | Path, overrides: Iterable[str] = (), checks: Iterable[Callable[[MachineSpec], object]] = ()
+    machine: str | Path,
+    overrides: Iterable[str] = (),
+    checks: Iterable[Callable[[MachineSpec], object]] = (),
+    partly: Iterable[Callable[[MachineSpec, Readable], object]] = (),
 ) -> MachineSpec:
     """Read a definition file, or one that ships by its name.
 
@@ -324,6 +401,8 @@ def load_machine(
         Further checks, such as building the geometry: each is called with the
         machine where its geometric tables are sound, and the bad input that it
         raises is reported together with the faults of the definition.
+    partly : iterable of callable
+        Called in their place where those tables are not sound: with what can be read of the machine.
 
     Raises
     ------
@@ -336,10 +415,12 @@ def load_machine(
     layers, content = _layers_and_content(machine, overrides)
     result = examine(content, layers)
     faults = list(result.faults)
-    if result.spec is not None and result.can_be_built:
-        for check in checks:
+    if result.spec is not None:
+        calls = [partial(check, result.spec) for check in checks if result.can_be_built]
+        calls += [partial(check, result.spec, result.readable) for check in partly if not result.can_be_built]
+        for call in calls:
             try:
-                check(result.spec)
+                call()
             except FaultsError as error:
                 faults += [relabelled(fault, layers) for fault in error.faults]
             except BadInputError as error:

@@ -116,6 +116,12 @@ def quantity_rule(annotation: Any) -> QuantityRule | None:
     return next((item for item in metadata if isinstance(item, QuantityRule)), None)
 
 
+def is_range(annotation: Any) -> bool:
+    """Whether a field takes from and to, or a place."""
+    _, metadata = _peeled(annotation)
+    return any(isinstance(item, RangeRule) for item in metadata)
+
+
 def literal_values(annotation: Any) -> tuple[Any, ...]:
     """The allowed values of a field that takes one of a few."""
     alternatives, metadata = _peeled(annotation)

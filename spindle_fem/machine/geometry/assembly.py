@@ -30,6 +30,7 @@ from spindle_fem.machine.geometry.meridian import MeridianMap
 from spindle_fem.machine.geometry.part_shapes import BallRowGeometry, PartGeometry, SurfaceDefinition
 
 if TYPE_CHECKING:
+    from spindle_fem.definition.load import Readable
     from spindle_fem.definition.machine_spec import MachineSpec
 
 REMAINING = "adiabatic"
@@ -103,19 +104,46 @@ def build_assembly(spec: MachineSpec, *, where: str | None = None) -> AssemblyGe
         parts += ring_geometries(bearing, kind)
         balls += element_rows(bearing, kind)
     surfaces = [surface_definition(surface) for surface in spec.all_surfaces]
-    channel = None
-    if spec.channel is not None:
-        values = {
-            name: getattr(spec.channel, name)
-            for name in (
-                "part", "inner_radius", "depth", "width", "pitch", "turns", "starts", "hand", "z_start"
-            )
-        }  # fmt: skip
-        ports = spec.channel.ports
-        channel = ChannelDefinition(**values, port_diameter=None if ports is None else ports.diameter)
+    channel = _channel(spec)
     return assemble(
         parts, surfaces, channel, balls, remaining=spec.remaining_surfaces, where=where or spec.name
     )
+
+
+def _channel(spec: MachineSpec) -> ChannelDefinition | None:
+    if spec.channel is None:
+        return None
+    keys = ("part", "inner_radius", "depth", "width", "pitch", "turns", "starts", "hand", "z_start")
+    values = {name: getattr(spec.channel, name) for name in keys}
+    ports = spec.channel.ports
+    return ChannelDefinition(**values, port_diameter=None if ports is None else ports.diameter)
+
+
+def require_readable_geometry(spec: MachineSpec, readable: Readable) -> None:
+    """Refuse what cannot be built of a machine whose tables have faults, whatever those would be.
+
+    Raises
+    ------
+    FaultsError
+        Parts that overlap, sound ones that come apart, surfaces and a channel that do not lie on sound ones.
+    """
+    parts = [part_geometry(part) for part in spec.part if part.segment]
+    for group, bearing in spec.bearings:
+        kind = spec.bearing_types.get(group.type_name(bearing))
+        if kind is not None:
+            parts += ring_geometries(bearing, kind)
+    names = [part.name for part in parts]
+    if len(set(names)) < len(names):
+        return
+    surfaces = [surface_definition(item) for item in spec.all_surfaces if item.name in readable.surfaces]
+    faults: list[GeometryError] = []
+    meridian = MeridianMap.of_parts(parts, surfaces, faults)
+    meridian.faults_of_sound_parts(surfaces, readable.parts, faults)
+    channel = _channel(spec) if readable.channel else None
+    if channel is not None and channel.part in readable.parts:
+        build_channel(channel, meridian, faults)
+    if faults:
+        raise FaultsError(spec.name, faults)
 
 
 def assemble(

@@ -160,9 +160,16 @@ def list_faces(pieces: list[Piece], part: int, facing: Facing) -> str:
     ]
     if not faces:
         return "none"
-    if faces[0].kind == "cylinder":
-        return "; ".join(f"r {in_millimetres(piece.r[0])}, z {span(piece.z)}" for piece in faces)
-    return "; ".join(f"z {in_millimetres(piece.z[0])}, r {span(piece.r)}" for piece in faces)
+    place, along = ("r", "z") if faces[0].kind == "cylinder" else ("z", "r")
+    spans: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    for low, high, at in sorted((*getattr(piece, along), getattr(piece, place)[0]) for piece in faces):
+        # A face is cut wherever a line of the drawing crosses it.
+        if spans[at] and spans[at][-1][1] == low:
+            low = spans[at].pop()[0]
+        spans[at].append((low, high))
+    return "; ".join(
+        f"{place} {in_millimetres(at)}, {along} {span(ends)}" for at, found in spans.items() for ends in found
+    )
 
 
 def merge_pieces(pieces: list[Piece], labels: list[str], names: Sequence[str]) -> tuple[MeridianEdge, ...]:

@@ -5,8 +5,8 @@ Coordinates are whole nanometres, so that touching is equality.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -110,6 +110,17 @@ class MeridianMap:
         labels = self._label(pieces, surfaces, remaining, faults)
         return merge_pieces(pieces, labels, self.part_names)
 
+    def faults_of_sound_parts(
+        self,
+        surfaces: Sequence[SurfaceDefinition],
+        sound: Collection[str],
+        faults: list[GeometryError],
+    ) -> None:
+        """Sound parts that come apart or pinch, and surfaces on them that match nothing."""
+        self._check_bodies(sound, faults)
+        own = [surface for surface in surfaces if surface.part in sound]
+        self._label(self.boundary_pieces(), own, "adiabatic", faults)
+
     def cell_boxes(self) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
         """Bounds (z low, z high, r low, r high) in nm and owner of every cell.
 
@@ -153,8 +164,6 @@ class MeridianMap:
         return pieces
 
     def _check_connection(self, pieces: list[Piece], faults: list[GeometryError]) -> None:
-        from scipy.ndimage import label
-
         touching = {part for piece in pieces if piece.is_contact for part in (piece.below, piece.above)}
         for index, name in enumerate(self.part_names):
             cells = self.owner == index
@@ -166,6 +175,15 @@ class MeridianMap:
                         f'part "{name}"', "touches no other part.", "Allowed: parts with a face in contact."
                     )
                 )
+        self._check_bodies(self.part_names, faults)
+
+    def _check_bodies(self, names: Collection[str], faults: list[GeometryError]) -> None:
+        from scipy.ndimage import label
+
+        for index, name in enumerate(self.part_names):
+            cells = self.owner == index
+            if name not in names or not cells.any():
+                continue
             _, number = label(cells)
             if number > 1:
                 faults.append(
@@ -198,6 +216,7 @@ class MeridianMap:
         names = self.part_names
         labels = [piece.joint_name(names) if piece.is_contact else "" for piece in pieces]
         claimed_twice: set[tuple[str, str]] = set()
+        unmatched: list[tuple[SurfaceDefinition, int]] = []
         for surface in surfaces:
             if surface.part not in names:
                 faults.append(
@@ -216,18 +235,29 @@ class MeridianMap:
                     if piece.is_exposed_of(part) and piece.lies_in(box)
                 ]
                 if not hits:
-                    faults.append(
-                        GeometryError(
-                            f'surface "{surface.name}", where[{number}]',
-                            f'{describe_box(box)} matches no exposed face of part "{surface.part}".',
-                            f"Faces that look {box.facing}: {list_faces(pieces, part, box.facing)}.",
-                        )
-                    )
+                    unmatched.append((surface, number))
                 for index in hits:
                     if labels[index] not in ("", surface.name):
                         claimed_twice.add((labels[index], surface.name))
                     else:
                         labels[index] = surface.name
+        for group in _in_rows(unmatched):
+            surface, number = group[0]
+            box, last = surface.where[number], group[-1][0]
+            what, places = f'surface "{surface.name}"', describe_box(box)
+            if last is surface:
+                what += f", where[{number + 1}]"
+            else:
+                what += f' to "{last.name}"'
+                places = describe_box(replace(box, z=(box.z[0], last.where[number].z[1])))
+            faults.append(
+                GeometryError(
+                    what,
+                    f'{places} matches no exposed face of part "{surface.part}".',
+                    f"Faces that look {box.facing}: "
+                    f"{list_faces(pieces, names.index(surface.part), box.facing)}.",
+                )
+            )
         for first, second in sorted(claimed_twice):
             faults.append(
                 GeometryError(
@@ -249,6 +279,25 @@ class MeridianMap:
                         )
                     )
         return labels
+
+
+def _in_rows(
+    unmatched: Sequence[tuple[SurfaceDefinition, int]],
+) -> list[list[tuple[SurfaceDefinition, int]]]:
+    """Surfaces and the places of boxes in them, those of one wall that is cut along z together."""
+    rows: list[list[tuple[SurfaceDefinition, int]]] = []
+    ends: dict[object, list[tuple[SurfaceDefinition, int]]] = {}
+    for surface, number in unmatched:
+        box, (base, _, cell) = surface.where[number], surface.name.rpartition(".")
+        wall = (base if cell.isdigit() else surface.name, surface.part, number, box.facing, box.r)
+        row = ends.get((*wall, None if box.z is None else to_nanometres(box.z[0])))
+        if row is None or not cell.isdigit():
+            row = []
+            rows.append(row)
+        row.append((surface, number))
+        if box.z is not None:
+            ends[*wall, to_nanometres(box.z[1])] = row
+    return rows
 
 
 def _within(nanometres: int, least: int) -> int:
