@@ -14,7 +14,7 @@ from typing import Any
 
 from spindle_fem.definition import bearing_catalogue, standard_materials
 from spindle_fem.definition.set_completion import add_set_rules
-from spindle_fem.errors import SpindleFemError
+from spindle_fem.errors import SpecError, SpindleFemError, did_you_mean
 from spindle_fem.units import to_si
 
 _UNKNOWN_WIDTH = 0.01
@@ -60,6 +60,33 @@ def complete(content: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Assumpti
 
         assumed += [Assumption(where, rule) for where, rule in add_surroundings(result)]
     return result, tuple(assumed)
+
+
+def unknown_catalogues(content: Mapping[str, Any]) -> list[SpindleFemError]:
+    """Bearings and greases that tables name and that do not ship."""
+    found: list[SpindleFemError] = []
+    types, grease = content.get("bearing_types"), content.get("grease")
+    for key, table in types.items() if isinstance(types, Mapping) else ():
+        name = table.get("catalogue") if isinstance(table, Mapping) else None
+        if isinstance(name, str) and bearing_catalogue.catalogue_bearing(name) is None:
+            what = f'"{name}" is no bearing that ships.'
+            found.append(SpecError(f"bearing_types.{key}.catalogue", what, bearing_catalogue.SHIPPED))
+    name = grease.get("catalogue") if isinstance(grease, Mapping) else None
+    if isinstance(name, str) and name not in standard_materials.GREASES:
+        allowed = did_you_mean(name, standard_materials.GREASES)
+        found.append(SpecError("grease.catalogue", f'"{name}" is no grease that ships.', allowed))
+    return found
+
+
+def without_supplied(faults: list[SpindleFemError], content: Mapping[str, Any]) -> list[SpindleFemError]:
+    """Faults without keys that are missing only because a name in their table is unknown."""
+    unknown = [*unknown_catalogues(content), *(fault for fault in faults if fault.where.endswith(".oil"))]
+    tables = {fault.where.rpartition(".")[0] for fault in unknown}
+    return [
+        fault
+        for fault in faults
+        if fault.what != "is missing." or fault.where.rpartition(".")[0] not in tables
+    ]
 
 
 def tables_of(value: Any) -> list[dict[str, Any]]:

@@ -132,6 +132,7 @@ def find_faults(spec: MachineSpec, declared: Declared | None = None) -> list[Spi
         declared = Declared.of(spec.model_dump(mode="json", by_alias=True, exclude_none=True))
     return [
         *_duplicates(declared),
+        *_segments(spec),
         *_materials(spec, declared),
         *bearing_faults(
             spec, declared.names["bearing_types"], all_sound="bearing_set" not in declared.unsound
@@ -169,6 +170,15 @@ def _duplicates(declared: Declared) -> Iterator[SpindleFemError]:
                 )
             if name in reserved:
                 yield SpecError(f"{key}.{name}", "has the name that a bearing gives.", "Choose another.")
+
+
+def _segments(spec: MachineSpec) -> Iterator[SpindleFemError]:
+    for part in spec.part:
+        names = [segment.name for segment in part.segment]
+        for name in dict.fromkeys(names):
+            if names.count(name) > 1:
+                what = f'the name "{name}" is used {names.count(name)} times.'
+                yield SpecError(f"part.{part.name}.segment", what, "Names must differ.")
 
 
 def _materials(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:

@@ -12,7 +12,13 @@ from typing import Any
 import tomli_w
 from pydantic import TypeAdapter, ValidationError
 
-from spindle_fem.definition.completion import Assumption, complete, with_named_types
+from spindle_fem.definition.completion import (
+    Assumption,
+    complete,
+    unknown_catalogues,
+    with_named_types,
+    without_supplied,
+)
 from spindle_fem.definition.consistency import Declared, find_faults
 from spindle_fem.definition.faults import validation_faults
 from spindle_fem.definition.inherit import (
@@ -156,7 +162,7 @@ class Readable:
     surfaces : frozenset of str
         Surfaces that the file names, and walls of circuits: not those that rules give.
     every_part : bool
-        Whether no part and no bearing is missing or faulty.
+        Whether no part is missing or faulty.
     channel : bool
         Whether the channel is as the file means it.
     """
@@ -192,13 +198,13 @@ class Readable:
         return cls(
             frozenset(sound),
             frozenset({*names_of(written.get("surface")), *walls}),
-            set(declared.parts) == sound,
+            sound.issuperset(declared.names["part"]),
             spec.channel is not None and not any(_is_inside(where, "channel") for where in places),
         )
 
 
 # Keys whose faults leave a part or bearing where it is.
-_NO_GEOMETRY = (".material", ".preload", ".takes_thrust", ".rotating")
+_NO_GEOMETRY = (".material", ".preload", ".takes_thrust", ".rotating", ".segment")
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,8 +256,9 @@ def examine(content: Mapping[str, Any], layers: Iterable[Layer] | str = "machine
     try:
         spec, faults = MachineSpec.model_validate(content), []
     except ValidationError as error:
-        faults = validation_faults(error, "", MachineSpec, content)
+        faults = without_supplied(validation_faults(error, "", MachineSpec, content), content)
         spec = _read_around(content, error)
+    faults = [*unknown_catalogues(content), *faults]
     keys = [field.alias or name for name, field in MachineSpec.model_fields.items()]
     unsound = frozenset(key for key in keys if any(_is_inside(fault.where, key) for fault in faults))
     told = [fault.where for fault in faults]
@@ -274,7 +281,7 @@ def _concerns_geometry(where: str) -> bool:
     """Whether a fault between tables keeps the geometry from being built."""
     if where in ("part", "surface", "bearing_set.bearing", "channel.part") or where.endswith(".bearing_type"):
         return True
-    named_part = where.startswith("part.") and not where.endswith(".material")
+    named_part = where.startswith("part.") and not where.endswith((".material", ".segment"))
     return named_part or (where.startswith("surface.") and where.endswith(".part"))
 
 

@@ -54,7 +54,10 @@ def _preload(groups: list[Any], position: int, kind: Mapping[str, Any]) -> Itera
         return
     sides = [row.get("takes_thrust") for row in rows if isinstance(row, Mapping)] if rows else []
     numbers = [sides.count(side) for side in ("towards_rear", "towards_nose")]
-    if not all(numbers):
+    if sum(numbers) < len(sides):
+        # A direction that is missing or unknown is the one fault: its set has some preload.
+        groups[position] = {**group, "preload": "0 N"}
+    if not all(numbers) or sum(numbers) < len(sides):
         return
     force = own * tandem_factor(*numbers)
     groups[position] = {**group, "preload": f"{force:.4g} N"}

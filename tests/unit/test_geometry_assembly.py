@@ -129,7 +129,7 @@ def test_selector_without_a_face_lists_those_there_are():
     surface = SurfaceDefinition("shaft.step", "shaft", (FaceBox("outward", r=(0.025, 0.025)),))
     (text,) = faults_of([shaft()], [surface])
     assert 'surface "shaft.step", where[1]: facing "outward", r 25 mm matches no exposed face' in text
-    assert "Faces that look outward: r 20 mm, z 0 to 100 mm." in text
+    assert "faces that look outward: r 20 mm, z 0 to 100 mm." in text
 
 
 def test_surface_of_unknown_part_suggests_one():

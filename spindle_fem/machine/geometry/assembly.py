@@ -106,8 +106,25 @@ def build_assembly(spec: MachineSpec, *, where: str | None = None) -> AssemblyGe
     surfaces = [surface_definition(surface) for surface in spec.all_surfaces]
     channel = _channel(spec)
     return assemble(
-        parts, surfaces, channel, balls, remaining=spec.remaining_surfaces, where=where or spec.name
+        parts,
+        surfaces,
+        channel,
+        balls,
+        seats=_seats(spec),
+        remaining=spec.remaining_surfaces,
+        where=where or spec.name,
     )
+
+
+def _seats(spec: MachineSpec) -> dict[str, float]:
+    """Radius at which each ring sits, m."""
+    found = {}
+    for group, bearing in spec.bearings:
+        kind = spec.bearing_types.get(group.type_name(bearing))
+        if kind is not None:
+            found[f"{bearing.name}.inner_ring"] = 0.5 * kind.bore_diameter
+            found[f"{bearing.name}.outer_ring"] = 0.5 * kind.outer_diameter
+    return found
 
 
 def _channel(spec: MachineSpec) -> ChannelDefinition | None:
@@ -139,6 +156,9 @@ def require_readable_geometry(spec: MachineSpec, readable: Readable) -> None:
     faults: list[GeometryError] = []
     meridian = MeridianMap.of_parts(parts, surfaces, faults)
     meridian.faults_of_sound_parts(surfaces, readable.parts, faults)
+    if readable.every_part:
+        seats = {name: radius for name, radius in _seats(spec).items() if name in readable.parts}
+        meridian.check_seats(seats, faults)
     channel = _channel(spec) if readable.channel else None
     if channel is not None and channel.part in readable.parts:
         build_channel(channel, meridian, faults)
@@ -152,6 +172,7 @@ def assemble(
     channel: ChannelDefinition | None = None,
     balls: Iterable[BallRowGeometry] = (),
     *,
+    seats: Mapping[str, float] = MappingProxyType({}),
     remaining: Literal["adiabatic", "error"] = REMAINING,
     where: str = "machine",
 ) -> AssemblyGeometry:
@@ -159,6 +180,8 @@ def assemble(
 
     Parameters
     ----------
+    seats : mapping of part to float, [m]
+        Radius at which it must sit on another.
     remaining : {"adiabatic", "error"}
         Exposed faces without a name go to ``<part>.adiabatic``, or are faults.
     where : str
@@ -181,6 +204,7 @@ def assemble(
         raise FaultsError(where, faults)
     meridian = MeridianMap.of_parts(parts, surfaces, faults)
     edges = meridian.named_edges(surfaces, remaining, faults)
+    meridian.check_seats(seats, faults)
     channel_geometry, notes = None, ()
     if channel is not None:
         channel_geometry, notes = build_channel(channel, meridian, faults)

@@ -5,7 +5,8 @@ Coordinates are whole nanometres, so that touching is equality.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -120,6 +121,35 @@ class MeridianMap:
         self._check_bodies(sound, faults)
         own = [surface for surface in surfaces if surface.part in sound]
         self._label(self.boundary_pieces(), own, "adiabatic", faults)
+
+    def check_seats(self, seats: Mapping[str, float], faults: list[GeometryError]) -> None:
+        """Rings that touch nothing at the radius [m] of their seat, by what lies nearest to it.
+
+        A ring that overlaps what it should sit on is a fault of its own.
+        """
+        loose: dict[str, list[str]] = defaultdict(list)
+        for name, radius in seats.items():
+            seat = to_nanometres(radius)
+            if name not in self.part_names or seat not in self.r_lines:
+                continue
+            above = int(np.searchsorted(self.r_lines, seat)) + 1
+            part = self.part_names.index(name)
+            outwards = part in self.owner[:, above]
+            own, other = (above, above - 1) if outwards else (above - 1, above)
+            along = np.flatnonzero(self.owner[:, own] == part)
+            if not along.size or np.any(self.owner[along, other] != VOID):
+                continue
+            beyond = self.owner[along[0], :above][::-1] if outwards else self.owner[along[0], above:]
+            away = int(np.argmax(beyond != VOID))
+            near = "nothing lies there"
+            if beyond[away] != VOID:
+                line = self.r_lines[above - 1 - away if outwards else above - 1 + away]
+                near = f'part "{self.part_names[beyond[away]]}" ends at r {in_millimetres(line)} there'
+            loose[f"{near}, the seat is at r {in_millimetres(seat)}."].append(f'"{name}"')
+        for near, rings in loose.items():
+            word, verb = ("part", "sits") if len(rings) == 1 else ("parts", "sit")
+            where, what = f"{word} {', '.join(rings)}", f"{verb} on nothing: {near}"
+            faults.append(GeometryError(where, what, "Allowed: rings that touch the parts that carry them."))
 
     def cell_boxes(self) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
         """Bounds (z low, z high, r low, r high) in nm and owner of every cell.
@@ -254,7 +284,7 @@ class MeridianMap:
                 GeometryError(
                     what,
                     f'{places} matches no exposed face of part "{surface.part}".',
-                    f"Faces that look {box.facing}: "
+                    f"Allowed: faces that look {box.facing}: "
                     f"{list_faces(pieces, names.index(surface.part), box.facing)}.",
                 )
             )
