@@ -79,31 +79,75 @@ bearing = [{name = "R1", z = "340 mm", takes_thrust = "towards_rear"}, {name = "
 
 # Ten mistakes of ten kinds: old text, new text, and what the fault must say.
 TEN = (
-    ('speed = "12000 rpm", thrust', 'speed = "12000 Hz", thrust', ("operation.speed", "wrong dimension", "3000 rpm")),
-    ('preload_kind = "spring"', 'preloading = "spring"', ("bearing_set.rear.preloading", "unknown key", '"preload"')),
-    ('outer_diameter = "99 mm"', "outer_diameter = 99", ("part.rotor.segment.stack.outer_diameter", "a unit is needed")),
-    ('"stator"\nmaterial = "electrical_steel"', '"stator"\nmaterial = "dynamo_steel"', ("part.stator.material", "electrical_steel")),
-    ('inner_diameter = "32 mm", outer_diameter = "68 mm"', 'inner_diameter = "32 mm", outer_diameter = "69 mm"', ('part "rotor"', 'overlaps part "shaft"')),
-    ('{name = "F2", z = "100 mm"', '{name = "F2", z = "104 mm"', ('part "F2.outer_ring"', 'overlaps part "housing"')),
+    (
+        'speed = "12000 rpm", thrust',
+        'speed = "12000 Hz", thrust',
+        ("operation.speed", "wrong dimension", "3000 rpm"),
+    ),
+    (
+        'preload_kind = "spring"',
+        'preloading = "spring"',
+        ("bearing_set.rear.preloading", "unknown key", '"preload"'),
+    ),
+    (
+        'outer_diameter = "99 mm"',
+        "outer_diameter = 99",
+        ("part.rotor.segment.stack.outer_diameter", "a unit is needed"),
+    ),
+    (
+        '"stator"\nmaterial = "electrical_steel"',
+        '"stator"\nmaterial = "dynamo_steel"',
+        ("part.stator.material", "electrical_steel"),
+    ),
+    (
+        'inner_diameter = "32 mm", outer_diameter = "68 mm"',
+        'inner_diameter = "32 mm", outer_diameter = "69 mm"',
+        ('part "rotor"', 'overlaps part "shaft"'),
+    ),
+    (
+        '{name = "F2", z = "100 mm"',
+        '{name = "F2", z = "104 mm"',
+        ('part "F2.outer_ring"', 'overlaps part "housing"'),
+    ),
     ('fluid = "ethylene_glycol_30", ', "", ("film.jacket.fluid", "is missing", "ethylene_glycol_30")),
-    ('"rotor_losses", part = "rotor"', '"rotor_losses", surface = "rotor.outside"', ("source.rotor_losses.surface", "no surface")),
+    (
+        '"rotor_losses", part = "rotor"',
+        '"rotor_losses", surface = "rotor.outside"',
+        ("source.rotor_losses.surface", "no surface"),
+    ),
     ('preload = "medium"\n', "", ("bearing_set.front.preload", "is missing", "light, medium or heavy")),
-    ('outer_diameter = "182 mm", z', 'outer_diameter = "190 mm", z', ('"jacket.outer.1" to "jacket.outer.8"', "r 95 mm matches no", "r 91 mm, z 130 to 330 mm")),
+    (
+        'outer_diameter = "182 mm", z',
+        'outer_diameter = "190 mm", z',
+        ('"jacket.outer.1" to "jacket.outer.8"', "r 95 mm matches no", "r 91 mm, z 130 to 330 mm"),
+    ),
 )
 # Ten of other kinds.
 TEN_OTHERS = (
     ('thrust = "500 N"', 'thrust = "50 kg"', ("operation.thrust", "wrong dimension")),
     ('"high_speed_grease"', '"speed_grease"', ("grease.catalogue", "high_speed_grease")),
-    ('inner_diameter = "32 mm", outer_diameter = "70 mm"', 'inner_diameter = "32 mm", outer_diameter = "69 mm"', ('parts "F1.inner_ring", "F2.inner_ring"', "ends at r 34.5 mm", "seat is at r 35 mm")),
+    (
+        'inner_diameter = "32 mm", outer_diameter = "70 mm"',
+        'inner_diameter = "32 mm", outer_diameter = "69 mm"',
+        ('parts "F1.inner_ring", "F2.inner_ring"', "ends at r 34.5 mm", "seat is at r 35 mm"),
+    ),
     ('r = "57 mm", z = "55 mm"', 'r = "50 mm", z = "55 mm"', ("probe.FRONT", "lies outside", "r 55-115 mm")),
     ('"7012 C HC"', '"7012 D"', ("bearing_set.rear.bearing_type", "no bearing type", "7014 C")),
     ('heat = ["20 W", "120 W"]', 'heat = ["20 W"]', ("source.rotor_losses.heat.heat", "has 1 entries")),
     ('name = "stop"', 'name = "front"', ("part.housing.segment", "used 2 times")),
     ('"20 degC", flow', '"20 C", flow', ("film.jacket.inlet_temperature", "15 degC")),
-    ('takes_thrust = "towards_nose"', 'takes_thrust = "forward"', ("bearing.F2.takes_thrust", "towards_rear, towards_nose")),
-    ("probe = [", """channel = {part = "housing", inner_radius = "108 mm", depth = "10 mm", width = "8 mm", pitch = "16 mm", turns = 3, z_start = "60 mm"}
+    (
+        'takes_thrust = "towards_nose"',
+        'takes_thrust = "forward"',
+        ("bearing.F2.takes_thrust", "towards_rear, towards_nose"),
+    ),
+    (
+        "probe = [",
+        """channel = {part = "housing", inner_radius = "108 mm", depth = "10 mm", width = "8 mm", pitch = "16 mm", turns = 3, z_start = "60 mm"}
 coolant = {fluid = "water", inlet_temperature = "20 degC", flow = "10 L/min"}
-probe = [""", ("channel.depth", "breaks through the outer wall", "at least 2 mm")),
+probe = [""",
+        ("channel.depth", "breaks through the outer wall", "at least 2 mm"),
+    ),
 )
 
 
