@@ -1,4 +1,4 @@
-"""First guesses of linear systems and of fixed points, from those solved before."""
+"""First guesses of linear systems, from those solved before."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-# Earlier iterates that are mixed into the next.
-EARLIER_ITERATES = 2
 # Corrections from which first guesses are combined.
 CORRECTIONS = 8
 
@@ -46,28 +44,3 @@ class RecentCorrections:
         fields = self._fields[:size]
         projected = self._stored[:size, :size] + shift * self._conducted[:size, :size]
         return np.linalg.lstsq(projected, fields @ residual, rcond=1e-9)[0] @ fields
-
-
-def mixed(past: list[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> NDArray[np.float64]:
-    """Anderson mixing: the combination of past iterates whose defects cancel best.
-
-    Parameters
-    ----------
-    past : list of ((n,) ndarray, (n,) ndarray)
-        Answers of a fixed-point map and their distance from what was put in, latest last.
-
-    Source: Walker & Ni (2011), SIAM J. Numer. Anal. 49, 1715-1735.
-
-    >>> linear = lambda x: np.array([0.5, 0.2]) * x + 1.0
-    >>> put = [np.zeros(2), np.ones(2), np.array([1.5, 1.2])]
-    >>> mixed([(linear(x), linear(x) - x) for x in put]).round(9).tolist()
-    [2.0, 1.25]
-    """
-    answer, defect = past[-1]
-    if len(past) == 1:
-        return answer
-    turns = np.array([defect - other for _, other in past[:-1]])
-    weights = np.linalg.lstsq(turns @ turns.T, turns @ defect, rcond=1e-10)[0]
-    return answer - sum(
-        weight * (answer - other) for weight, (other, _) in zip(weights, past[:-1], strict=True)
-    )

@@ -12,12 +12,13 @@ from scipy import sparse
 from spindle_fem.errors import ConvergenceError, SpecError
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, reference_temperature
 from spindle_fem.model.mesh.equations import assemble_capacity, assemble_load, assemble_system
-from spindle_fem.model.mesh.first_guesses import EARLIER_ITERATES, RecentCorrections, mixed
+from spindle_fem.model.mesh.first_guesses import RecentCorrections
 from spindle_fem.model.mesh.heat_balance import BoundaryFlows, boundary_flows
 from spindle_fem.model.mesh.linear_solvers import Preconditioner, build_preconditioner, solve_linear
 from spindle_fem.model.mesh.linear_system import ThermalSystem
+from spindle_fem.model.mesh.stage_iteration import UNKNOWN_CONTRACTION, StageIteration
 from spindle_fem.model.mesh.steady_conduction import close_balance, split_unknowns
-from spindle_fem.model.mesh.step_control import StepControl
+from spindle_fem.model.mesh.step_control import LEAST_SHARE, StepControl
 from spindle_fem.model.mesh.temperature_films import linearise_films
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.model.trbdf2 import (
@@ -40,10 +41,6 @@ STALE_FACTOR = 1.6
 # Nor does it serve for steps so many times longer or shorter, whatever it takes: one that is made for a
 # short step nearly weighs storage alone.
 OTHER_STEP = 10.0
-# Share of a change that the next iteration of a stage leaves, while nothing is known of it.
-UNKNOWN_CONTRACTION = 1.0
-# A contraction that is better than before is believed only so far.
-SLOWEST_GAIN = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +127,7 @@ class StageSolver:
         self._kept = _Kept()
         self._recent = RecentCorrections()
         self._shift = 0.0
-        self._contraction = UNKNOWN_CONTRACTION
+        self._iteration = StageIteration()
         self.linear_iterations = 0
         self.matrix_builds = 0
         self.preconditioner_builds = 0
@@ -197,9 +194,9 @@ class StageSolver:
         self._kept.slope = None
         self._kept.before = None
 
-    def forget_contraction(self) -> None:
+    def forget_iteration(self) -> None:
         """Drop what is known of the iteration: other inputs, another coupling."""
-        self._contraction = UNKNOWN_CONTRACTION
+        self._iteration.forget()
 
     def flows(self, stage: Stage) -> BoundaryFlows:
         """Heat across the boundary at a stage."""
@@ -245,7 +242,7 @@ class StageSolver:
     ) -> Stage:
         n = self._operators.n_unknowns
         unknowns = guess
-        past: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        self._iteration.begin(size)
         for attempt in range(MAX_STAGE_ITERATIONS):
             values = self._values(unknowns)
             asked = self._inputs(time, ThermalState(time, values[:n], values[n:], state.step))
@@ -262,16 +259,12 @@ class StageSolver:
                 reduction=REDUCTION if iterate else 0.0,
                 judge=attempt == 0,
             )
-            defect = following - unknowns
-            change = float(np.abs(defect).max())
-            if attempt == 1:
-                # the first two changes are of the plain iteration: nothing is mixed yet
-                first_change = float(np.abs(past[0][1]).max())
-                self._contraction = max(change / first_change, SLOWEST_GAIN * self._contraction)
-            if not iterate or self._is_left(change) <= self._control.nonlinear:
+            if not iterate:
                 return self._stage(problem, following, load)
-            past = [*past[-EARLIER_ITERATES:], (following, defect)]
-            unknowns = mixed(past)
+            change = self._iteration.answered(unknowns, following)
+            if self._is_left(change) <= self._control.nonlinear:
+                return self._stage(problem, following, load)
+            unknowns = self._iteration.mixed()
         raise ConvergenceError(
             f"time {time:g} s",
             f"a stage still changes by {change:.3g} K after {MAX_STAGE_ITERATIONS} iterations.",
@@ -280,10 +273,11 @@ class StageSolver:
 
     def _is_left(self, change: float) -> float:
         """Upper bound of the remaining change, K, from the last iteration's change."""
-        if not self._control.trust_contraction or self._contraction >= UNKNOWN_CONTRACTION:
+        contraction = self._iteration.contraction
+        if not self._control.trust_contraction or contraction >= UNKNOWN_CONTRACTION:
             return change
-        share = self._contraction / (1.0 - self._contraction) + REDUCTION
-        return min(share, 1.0) * change
+        share = contraction / (1.0 - contraction) + REDUCTION
+        return min(max(share, LEAST_SHARE), 1.0) * change
 
     def _solve(
         self,

@@ -218,7 +218,7 @@ def integrate(
             solver.forget_slope()
         if end in anew:
             step = first_step
-            solver.forget_contraction()
+            solver.forget_iteration()
         state = solver.state_after(stages, end, step)
         if observer is not None and observer(state):
             break
