@@ -26,6 +26,7 @@ from spindle_fem.model.trbdf2 import (
     GAMMA,
     error_defect,
     extrapolated_end,
+    interpolate_step,
     right_of_end,
     right_of_middle,
 )
@@ -34,7 +35,7 @@ MAX_STAGE_ITERATIONS = 30
 # The error estimate itself is solved to this fraction of the tolerance.
 ERROR_SOLVE_FRACTION = 0.02
 # While a stage is iterated, each solve needs to be this much better than its guess only.
-REDUCTION = 0.02
+REDUCTION = 0.005
 # A preconditioner of other coefficients or steps serves until it takes so many times the iterations
 # that it took when new for the same decades of error.
 STALE_FACTOR = 1.6
@@ -80,8 +81,7 @@ class _Kept:
     preconditioned_step: float = -1.0
     fresh_effort: float | None = None
     stale: bool = False
-    slope: NDArray[np.float64] | None = None
-    before: tuple[float, NDArray[np.float64]] | None = None
+    before: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
 
 
 class StageSolver:
@@ -150,8 +150,10 @@ class StageSolver:
     def take_step(self, state: ThermalState, end: float, size: float) -> list[Stage]:
         """The three stages of a step from a state."""
         first = self._first_stage(state)
-        slope = self._kept.slope
-        guess = first.unknowns if slope is None else first.unknowns + GAMMA * size * slope
+        guess = first.unknowns
+        if self._kept.before is not None:
+            length, earlier, middle = self._kept.before
+            guess = interpolate_step(1.0 + GAMMA * size / length, earlier, middle, first.unknowns)
         base = self._storage @ first.unknowns
         middle = self._solve_stage(
             right_of_middle(base, size, first.rate), state.time + GAMMA * size, size, guess, state
@@ -186,12 +188,10 @@ class StageSolver:
 
     def accept(self, stages: list[Stage], size: float) -> None:
         """Remember the slope at the end of a step, for the next step's first guess."""
-        self._kept.slope = (stages[2].unknowns - stages[1].unknowns) / ((1.0 - GAMMA) * size)
-        self._kept.before = (size, stages[0].unknowns)
+        self._kept.before = (size, stages[0].unknowns, stages[1].unknowns)
 
     def forget_slope(self) -> None:
         """Discard the data for initial guesses, because the inputs jump."""
-        self._kept.slope = None
         self._kept.before = None
 
     def forget_iteration(self) -> None:
@@ -211,7 +211,7 @@ class StageSolver:
         """End of a step from its two stages and the start of the step before, on a parabola."""
         if self._kept.before is None:
             return extrapolated_end(first, middle)
-        length, earlier = self._kept.before
+        length, earlier, _ = self._kept.before
         return extrapolated_end(first, middle, earlier, length / size)
 
     def _first_stage(self, state: ThermalState) -> Stage:
