@@ -2,11 +2,10 @@
 
 Each stage of a time step evaluates the loads at its own time and at its own
 latest temperatures and is solved again until they agree, so the coupled
-scheme keeps the second order of the time steps. Coefficients of the matrix
-(films, ball contacts) are only renewed when they have moved by more than a
-small share: the matrix then serves many steps. Heat and surrounding
-temperatures are always those of the temperatures themselves. A step begins with
-what its predecessor ended with, unless an input jumps or a term is switched.
+scheme keeps the second order of the time steps. The matrix serves until a film,
+joint or contact of balls has moved by more than a small share; what they differ
+by until then acts as heat. A step begins with what its predecessor ended with,
+unless an input jumps or a term is switched.
 """
 
 from __future__ import annotations
@@ -23,14 +22,13 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.errors import NoEquilibriumError, NoSteadyStateError, OutOfValidityError
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem
+from spindle_fem.model.mesh.kept_coefficients import near, on_matrix_of
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.model.trbdf2 import WEIGHTS
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.coolant_loop import CoolantState
-from spindle_fem.operation.loads import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads
-from spindle_fem.operation.machine_loads import FieldState
+from spindle_fem.operation.loads import NO_CHANGE, BearingHeat, LoadChange, Loads
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.physics.coolant.march import march_enthalpy
 from spindle_fem.solvers.input_history import FIELD_OF, OperatingHistory
 from spindle_fem.solvers.mesh_terms import NO_PHYSICS, FieldTerms, Physics
 from spindle_fem.solvers.prepared_machine import PreparedMachine
@@ -118,7 +116,7 @@ class CoupledInputs:
     ----------
     coefficient_tolerance : float, [-]
         Relative change of a film or contact coefficient below which the
-        matrix keeps the old one; 0 renews it at every stage.
+        matrix keeps the old one and the difference is heat; 0 renews it at every stage.
     physics : Physics, optional
         Terms beyond the machine's own.
     memory : ndarray, optional
@@ -144,16 +142,15 @@ class CoupledInputs:
         self.machine = replace(machine, builder=builder)
         self.history = history
         self.coefficient_tolerance = coefficient_tolerance
-        self._kept: dict[tuple[str, ...], Array] = {}
+        self._kept: ConductionProblem | None = None
         self._names: tuple[str, ...] | None = None
-        self._channel: tuple[Array, dict[str, Array]] | None = None
         self._asked: list[Evaluation] = []
         self.evaluations = 0
 
     def lumped_names(self, start: Array) -> tuple[str, ...]:
         """Names of the lumped nodes, in the order of their unknowns."""
         first = float(self.history.inputs.times[0])
-        return tuple(node.name for node in self._loads(first, self.history.at(first), start, {})[1].lumped)
+        return tuple(node.name for node in self._loads(first, self.history.at(first), start, {})[0].lumped)
 
     def __call__(self, time: float, state: ThermalState) -> ConductionProblem:
         """Problem at a time and a state.
@@ -173,14 +170,9 @@ class CoupledInputs:
         change = NO_CHANGE
         if self.terms is not None:
             change = self.terms.at(time, point, state.temperature, state.lumped_temperature)
-            change = replace(change, coefficients=self._factors(change))
-        field, loads, coolant = self._loads(time, point, state.temperature, lumped, change)
-        loads = replace(loads, films=self._films(loads), lumped=self._lumped(loads))
-        if coolant is not None:
-            coolant = self._coolant(point.coolant_inlet_temperature + change.inlet, coolant, field)
-            loads = replace(loads, films={**loads.films, **self._channel_films(coolant)})
+        loads, coolant = self._loads(time, point, state.temperature, lumped, change)
         self.evaluations += 1
-        problem = self.machine.problem(loads)
+        problem = self._on_kept_matrix(self.machine.problem(loads), state)
         self._asked.append(Evaluation(time, point, loads, coolant))
         self._latest = _Answer(self._asked[-1], problem)
         return problem
@@ -249,85 +241,22 @@ class CoupledInputs:
         temperature: Array,
         lumped: Mapping[str, float],
         change: LoadChange = NO_CHANGE,
-    ) -> tuple[FieldState, Loads, CoolantState | None]:
+    ) -> tuple[Loads, CoolantState | None]:
         try:
             field = self.machine.field_state(temperature, lumped)
-            loads, coolant = self.machine.builder.at(point, field, change)
+            return self.machine.builder.at(point, field, change)
         except (NoEquilibriumError, OutOfValidityError) as error:
             raise NoSteadyStateError(
                 f"{self.machine.spec.name} after {time / 3600.0:.2f} h",
                 f"no loads at {point.speed * 30.0 / np.pi:.0f} rpm with these temperatures: {error}",
             ) from error
-        return field, loads, coolant
 
-    def _keep(self, key: tuple[str, ...], fresh: Array) -> Array:
-        """The kept coefficient where the fresh one is as good, else the fresh one."""
-        kept = self._kept.get(key)
-        if kept is not None and kept.shape == fresh.shape:
-            allowed = self.coefficient_tolerance * float(np.abs(kept).max(initial=0.0))
-            if float(np.abs(fresh - kept).max(initial=0.0)) <= allowed:
-                return kept
-        self._kept[key] = fresh
-        return fresh
-
-    def _factors(self, change: LoadChange) -> dict[str, float]:
-        """Factors of what no film or node keeps: joints and conductivities."""
-        return {
-            name: float(self._keep(("factor", name), np.array([value]))[0])
-            if name.startswith(("joint.", "conductivity."))
-            else value
-            for name, value in change.coefficients.items()
-        }
-
-    def _films(self, loads: Loads) -> dict[str, FilmLoad]:
-        cells = self.machine.builder.cells
-        own = () if cells is None else cells.surfaces
-        return {
-            surface: replace(film, coefficient=self._keep(("film", surface), film.coefficient))
-            for surface, film in loads.films.items()
-            if surface not in own
-        }
-
-    def _lumped(self, loads: Loads) -> tuple:
-        return tuple(
-            replace(
-                node,
-                connections={
-                    surface: self._keep(("lumped", node.name, surface), value)
-                    for surface, value in node.connections.items()
-                },
-            )
-            for node in loads.lumped
-        )
-
-    def _coolant(self, inlet: float, fresh: CoolantState, field: FieldState) -> CoolantState:
-        """The march with the coefficients that the matrix has, so that walls and coolant agree."""
-        kept = self._keep(("channel",), fresh.film_coefficient)
-        if kept is fresh.film_coefficient:
+    def _on_kept_matrix(self, fresh: ConductionProblem, state: ThermalState) -> ConductionProblem:
+        """The problem on the matrix that serves, or on its own where that is too far off."""
+        if self._kept is None or not near(fresh, self._kept, self.coefficient_tolerance):
+            self._kept = fresh
             return fresh
-        builder = self.machine.builder
-        march = march_enthalpy(
-            inlet,
-            fresh.march.mass_flow,
-            fresh.march.march.specific_heat_capacity,
-            builder.wall_temperature(field),
-            builder.cells.cell_area,
-            kept,
-            fresh.march.march.pumping_heat,
-        )
-        return replace(fresh, march=replace(fresh.march, march=march), film_coefficient=kept)
-
-    def _channel_films(self, coolant: CoolantState) -> dict[str, FilmLoad]:
-        cells = self.machine.builder.cells
-        bulk = np.broadcast_to(coolant.march.march.bulk_temperature, cells.cell_area.shape).ravel()
-        if self._channel is None or self._channel[0] is not coolant.film_coefficient:
-            flat = coolant.film_coefficient.ravel()
-            spread = {surface: flat[index] for surface, index in cells.facet_cell.items()}
-            self._channel = (coolant.film_coefficient, spread)
-        return {
-            surface: FilmLoad(surface, self._channel[1][surface], bulk[index])
-            for surface, index in cells.facet_cell.items()
-        }
+        return on_matrix_of(self._kept, fresh, state.temperature, state.lumped_temperature)
 
 
 def _same_inputs(one: OperatingPoint, other: OperatingPoint) -> bool:

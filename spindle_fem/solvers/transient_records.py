@@ -36,8 +36,8 @@ class TransientOptions:
     coupling_tolerance : float, [K]
         Change at which loads and temperatures of a stage agree.
     coefficient_tolerance : float, [-]
-        Relative change of a film or contact coefficient that renews the
-        matrix; 0 renews it at every stage.
+        Relative change of a film, joint or contact coefficient that renews the
+        matrix, smaller ones act as heat; 0 renews it at every stage.
     first_step : float, [s]
         After the start and after every jump of the inputs.
     fixed_step : float or None, [s]
@@ -56,7 +56,7 @@ class TransientOptions:
 
     error: float = 0.05
     coupling_tolerance: float = 3.0e-8
-    coefficient_tolerance: float = 5.0e-4
+    coefficient_tolerance: float = 2.0e-2
     first_step: float = 0.1
     fixed_step: float | None = None
     input_resolution: float = TEMPERATURE_RESOLUTION
