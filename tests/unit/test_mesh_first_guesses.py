@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from spindle_fem.model.mesh.first_guesses import CORRECTIONS, RecentCorrections, mixed
+from spindle_fem.model.mesh.first_guesses import CORRECTIONS, RecentCorrections
 
 RNG = np.random.default_rng(0)
 
@@ -58,21 +58,3 @@ def test_the_same_correction_twice_does_no_harm():
     recent.add(field, STORAGE, CONDUCTION)
     load = 2.0 * ((STORAGE + CONDUCTION) @ field)
     assert recent.combine(load, 1.0) == pytest.approx(2.0 * field, rel=1e-6)
-
-
-def test_mixing_solves_a_linear_map_of_two_modes_in_three_answers():
-    turn = np.linalg.qr(RNG.normal(size=(6, 6)))[0]
-    slope = turn @ np.diag([0.9, -0.5, 0.0, 0.0, 0.0, 0.0]) @ turn.T
-    offset = turn[:, :2] @ RNG.normal(size=2)
-    exact = np.linalg.solve(np.eye(6) - slope, offset)
-    past, put = [], np.zeros(6)
-    for _ in range(3):
-        answer = slope @ put + offset
-        past.append((answer, answer - put))
-        put = mixed(past)
-    assert put == pytest.approx(exact, abs=1e-9)
-
-
-def test_one_answer_alone_is_taken_as_it_is():
-    answer = RNG.normal(size=5)
-    assert mixed([(answer, np.ones(5))]) is answer

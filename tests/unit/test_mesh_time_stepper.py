@@ -158,11 +158,11 @@ def test_a_trusted_contraction_saves_solves_and_keeps_the_tolerance():
         return integrate(inputs, START, 20000.0, control=control).state.temperature, len(asked)
 
     exact, _ = run(nonlinear_tolerance=1e-9)
-    plain, calls = run(nonlinear_tolerance=1e-3)
-    trusting, fewer = run(nonlinear_tolerance=1e-3, trust_contraction=True)
+    plain, calls = run(nonlinear_tolerance=1e-5)
+    trusting, fewer = run(nonlinear_tolerance=1e-5, trust_contraction=True)
     assert fewer < 0.85 * calls
-    assert np.abs(plain - exact).max() < 1e-3
-    assert np.abs(trusting - exact).max() < 1e-3
+    assert np.abs(plain - exact).max() < 1e-5
+    assert np.abs(trusting - exact).max() < 1e-5
 
 
 def test_samples_lie_on_the_path():
@@ -234,7 +234,7 @@ def _other_nodes(time, state):
 
 
 def test_hidden_jump_is_an_error_that_asks_for_breakpoints(monkeypatch):
-    monkeypatch.setattr("spindle_fem.model.mesh.time_stepper.MAX_REJECTIONS", 4)
+    monkeypatch.setattr("spindle_fem.model.mesh.time_stepper.MAX_REJECTIONS", 2)
 
     def inputs(time, state):
         return replace(PROBLEM, surface_heat={"inner.inner": 1e6 * (time > 50.0)})
@@ -294,15 +294,16 @@ def test_blocks_that_do_not_fit_are_refused():
         build_box((1.0, 1.0, 1.0), (1, 0, 1))
 
 
-def test_steps_grow_by_powers_of_the_root_of_two():
+def test_steps_follow_the_trend_of_their_error():
+    """While a machine relaxes, steps of one error grow; each is about as long as the error asked for lets it."""
     result = integrate(PROBLEM, START, 5e4, control=StepControl(tolerance=0.01, first_step=0.5))
     # The last steps are cut to end in time.
-    sizes = np.diff(result.step_times)[:-2]
-    rungs = 2.0 * np.log2(sizes / 0.5)
-    assert np.abs(rungs - np.round(rungs)).max() < 1e-9
-    assert len(np.unique(np.round(rungs))) > 8
-    assert np.diff(rungs).max() <= 4.0 + 1e-9
+    sizes, errors = np.diff(result.step_times)[:-2], result.step_errors[:-2]
+    assert (sizes[1:] / sizes[:-1]).max() <= 4.0 + 1e-9
     assert result.step_errors.max() <= 0.01
+    grown = sizes > 10.0 * sizes[0]
+    assert np.median(errors[grown]) > 0.004
+    assert len(sizes) < 26
 
 
 def test_one_preconditioner_serves_steps_of_many_sizes():

@@ -15,6 +15,8 @@ DIFFERENCES = 6
 INDEPENDENT = 1e-4
 # Share of a change that another answer leaves, while nothing is known of it.
 UNKNOWN_CONTRACTION = 1.0
+# Shares are of a change's largest entry, seen along the changes that there were: others may leave more.
+CAUTION = 2.0
 # A contraction that is better than in earlier stages is believed only so far.
 SLOWEST_GAIN = 0.5
 
@@ -41,8 +43,8 @@ class StageIteration:
     ...     put = iteration.mixed()
     >>> put.round(9).tolist()
     [2.0, 1.25]
-    >>> round(iteration.contraction, 3)
-    0.5
+    >>> iteration.contraction
+    1.0
     >>> iteration.begin(size=1.0)
     >>> iteration.answered(np.zeros(2), linear(np.zeros(2)))
     1.0
@@ -62,12 +64,16 @@ class StageIteration:
     @property
     def contraction(self) -> float:
         """Share of a change that the next answer of this stage leaves, at most."""
+        return min(CAUTION * self._share, UNKNOWN_CONTRACTION)
+
+    @property
+    def _share(self) -> float:
         return max(self._expected, self._largest)
 
     def begin(self, size: float) -> None:
         """Begin a stage of a step of this length, [s]."""
         longer = max(size / self._size, 1.0) if self._size else 1.0
-        self._expected = min(longer * self.contraction, UNKNOWN_CONTRACTION)
+        self._expected = min(longer * self._share, UNKNOWN_CONTRACTION)
         self._size, self._largest, self._last = size, 0.0, None
 
     def forget(self) -> None:
