@@ -46,9 +46,8 @@ COARSE_MESH = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
 # Noise of the quietest channel [K] counts within these: a coarse mesh is not as good as the best sensors, and
 # loads must follow the field even for the worst.
 QUIETEST, LOUDEST = 0.02, 0.2
-# First step of a run, s, and change of films that makes a new matrix, as a share.
+# First step of a run, s.
 FIRST_STEP = 30.0
-COEFFICIENT_TOLERANCE = 5.0e-3
 # Most time steps of a fit that is run unasked: it then takes about as long as the search.
 MOST_STEPS = 800
 # Further steps that a jump of an input costs.
@@ -174,7 +173,6 @@ def options_for(predictor: Predictor) -> TransientOptions:
         error=tuned.STEP_ERROR * noise,
         coupling_tolerance=tuned.COUPLING_ERROR * noise,
         input_resolution=tuned.INPUT_RESOLUTION * noise,
-        coefficient_tolerance=COEFFICIENT_TOLERANCE,
         first_step=FIRST_STEP,
         trust_contraction=True,
         method="multigrid",

@@ -13,7 +13,6 @@ from spindle_fem.errors import RecordingError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.full_model_check import (
     COARSE,
-    COEFFICIENT_TOLERANCE,
     FIRST_STEP,
     MOST_STEPS,
     spec_on,
@@ -37,7 +36,6 @@ OPTIONS = TransientOptions(
     error=tuned.STEP_ERROR * READ_TO,
     coupling_tolerance=tuned.COUPLING_ERROR * READ_TO,
     input_resolution=tuned.INPUT_RESOLUTION * READ_TO,
-    coefficient_tolerance=COEFFICIENT_TOLERANCE,
     first_step=FIRST_STEP,
     trust_contraction=True,
     method="multigrid",

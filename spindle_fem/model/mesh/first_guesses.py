@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from spindle_fem.model.mesh.linear_solvers import multiply
+
 # Corrections from which first guesses are combined.
 CORRECTIONS = 8
 
@@ -34,7 +36,7 @@ class RecentCorrections:
         scaled = correction / np.abs(correction).max()
         self._fields[place] = scaled
         for table, matrix in ((self._stored, storage), (self._conducted, conduction)):
-            table[place] = table[:, place] = self._fields @ (matrix @ scaled)
+            table[place] = table[:, place] = self._fields @ multiply(matrix, scaled)
 
     def combine(self, residual: NDArray[np.float64], shift: float) -> NDArray[np.float64]:
         """Galerkin solution of ``(M + shift K) x = residual`` among the recent corrections."""

@@ -56,6 +56,14 @@ class ThermalSystem:
             return self.matrix
         return _bordered(self.matrix, -sparse.csr_array(self.exchange), self.lumped_matrix)
 
+    def beside_full(self, matrix: sparse.csr_array, corner: NDArray[np.float64]) -> sparse.csr_array:
+        """``[A 0; 0 C]`` on the pattern of the full matrix, for sums with it."""
+        if not self.n_lumped:
+            return matrix
+        border = sparse.csr_array(self.exchange)
+        border.data = np.zeros_like(border.data)
+        return _bordered(matrix, border, corner)
+
     def full_load(self) -> NDArray[np.float64]:
         """``[f; f_l]``."""
         return np.concatenate((self.load, self.lumped_load))
@@ -89,7 +97,11 @@ def _bordered(
     corner : (m, m) ndarray
     """
     n, m = border.shape
-    below = sparse.csr_array(sparse.hstack((border.T, sparse.csr_array(corner))))
+    # every entry of the corner, so that its pattern is the same whatever is zero
+    square = sparse.csr_array(
+        (np.ravel(corner), np.tile(np.arange(m), m), np.arange(0, m * m + 1, m)), shape=(m, m)
+    )
+    below = sparse.csr_array(sparse.hstack((border.T, square)))
     ends = matrix.indptr + border.indptr
     indptr = np.concatenate((ends, ends[-1] + below.indptr[1:])).astype(np.int32)
     indices, data = room(int(indptr[-1]), np.int32), room(int(indptr[-1]))

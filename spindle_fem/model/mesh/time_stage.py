@@ -14,8 +14,8 @@ from spindle_fem.model.mesh.conduction_problem import ConductionProblem, referen
 from spindle_fem.model.mesh.equations import assemble_capacity, assemble_load, assemble_system
 from spindle_fem.model.mesh.first_guesses import RecentCorrections
 from spindle_fem.model.mesh.heat_balance import BoundaryFlows, boundary_flows
-from spindle_fem.model.mesh.linear_solvers import Preconditioner, build_preconditioner, solve_linear
-from spindle_fem.model.mesh.linear_system import ThermalSystem
+from spindle_fem.model.mesh.linear_solvers import Preconditioner, build_preconditioner, multiply, solve_linear
+from spindle_fem.model.mesh.linear_system import ThermalSystem, merged
 from spindle_fem.model.mesh.stage_iteration import UNKNOWN_CONTRACTION, StageIteration
 from spindle_fem.model.mesh.steady_conduction import close_balance, split_unknowns
 from spindle_fem.model.mesh.step_control import LEAST_SHARE, StepControl
@@ -114,16 +114,11 @@ class StageSolver:
         storage, lumped_capacity = assemble_capacity(problem)
         self._lumped_capacity = lumped_capacity
         self._content = np.concatenate((storage @ np.ones(storage.shape[0]), lumped_capacity))
-        self._tie = assemble_system(self._linear(problem, start.temperature)).tie
-        self._tied_storage = (
-            storage if self._tie is None else sparse.csr_array(self._tie.T @ storage @ self._tie)
-        )
+        system = assemble_system(self._linear(problem, start.temperature))
+        self._tie = system.tie
+        self._tied_storage = storage if self._tie is None else merged(storage, self._tie)
         self._n = self._tied_storage.shape[0]
-        self._storage = (
-            sparse.block_diag((self._tied_storage, sparse.diags_array(lumped_capacity)), format="csr")
-            if len(lumped_capacity)
-            else self._tied_storage
-        )
+        self._storage = system.tied().beside_full(self._tied_storage, np.diag(lumped_capacity))
         self._kept = _Kept()
         self._recent = RecentCorrections()
         self._shift = 0.0
@@ -154,7 +149,7 @@ class StageSolver:
         if self._kept.before is not None:
             length, earlier, middle = self._kept.before
             guess = interpolate_step(1.0 + GAMMA * size / length, earlier, middle, first.unknowns)
-        base = self._storage @ first.unknowns
+        base = multiply(self._storage, first.unknowns)
         middle = self._solve_stage(
             right_of_middle(base, size, first.rate), state.time + GAMMA * size, size, guess, state
         )
@@ -289,7 +284,7 @@ class StageSolver:
         judge: bool,
     ) -> NDArray[np.float64]:
         kept = self._kept
-        known = self._recent.combine(right - matrix @ guess, self._shift)
+        known = self._recent.combine(right - multiply(matrix, guess), self._shift)
         solution = solve_linear(
             matrix,
             right,
@@ -324,6 +319,7 @@ class StageSolver:
             kept.system = assemble_system(problem, self._reference)
             kept.tied = kept.system.tied()
             kept.conduction = kept.tied.full_matrix()
+            self._storage = kept.tied.beside_full(self._tied_storage, np.diag(self._lumped_capacity))
             kept.coefficients = problem
             kept.matrix = None
         return kept.tied
@@ -334,7 +330,7 @@ class StageSolver:
         if kept.matrix is None or abs(size - kept.step) > 1e-12 * size or kept.stale:
             factor = size * DIAGONAL
             kept.matrix = add_scaled(self._storage, factor, kept.conduction)
-            kept.row_sums = kept.matrix @ np.ones(kept.matrix.shape[0])
+            kept.row_sums = multiply(kept.matrix, np.ones(kept.matrix.shape[0]))
             kept.step = size
             self.matrix_builds += 1
             ratio = size / kept.preconditioned_step
@@ -370,14 +366,22 @@ class StageSolver:
     def _stage(
         self, problem: ConductionProblem, unknowns: NDArray[np.float64], load: NDArray[np.float64]
     ) -> Stage:
-        return Stage(problem, unknowns, load - self._kept.conduction @ unknowns, self._values(unknowns))
+        rate = load - multiply(self._kept.conduction, unknowns)
+        return Stage(problem, unknowns, rate, self._values(unknowns))
 
 
 def add_scaled(one: sparse.csr_array, factor: float, other: sparse.csr_array) -> sparse.csr_array:
     """``one + factor · other``; on one pattern only the entries are added."""
-    if one.nnz == other.nnz and one.indices.ctypes.data == other.indices.ctypes.data:
+    if _one_pattern(one, other):
         return sparse.csr_array((one.data + factor * other.data, one.indices, one.indptr), shape=one.shape)
     return sparse.csr_array(one + factor * other)
+
+
+def _one_pattern(one: sparse.csr_array, other: sparse.csr_array) -> bool:
+    if one.nnz != other.nnz:
+        return False
+    same = one.indices.ctypes.data == other.indices.ctypes.data
+    return same or (np.array_equal(one.indptr, other.indptr) and np.array_equal(one.indices, other.indices))
 
 
 def same_coefficients(one: ConductionProblem, other: ConductionProblem) -> bool:
