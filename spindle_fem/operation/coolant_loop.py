@@ -69,11 +69,35 @@ class CoolantLoop:
         film_factor : float
             Beside that of the definition.
         """
+        driven, factor, pressure = self._driven(point, film_factor)
+        march = driven.settle(wall_temperature)
+        shape = self.cells.cell_area.shape
+        value, low, high = (
+            np.broadcast_to(factor * np.asarray(item), shape)
+            for item in (march.film.value, march.film.low, march.film.high)
+        )
+        return CoolantState(march, value, low, high, pressure)
+
+    def outlets(
+        self, point: OperatingPoint, walls: NDArray[np.float64], *, film_factor: float = 1.0
+    ) -> NDArray[np.float64]:
+        """Mixed outlet temperature at one operating point over many walls, (m,) [K].
+
+        Parameters
+        ----------
+        walls : (m, n_starts, n) ndarray, [K]
+        """
+        return self._driven(point, film_factor)[0].outlets(walls)
+
+    def _driven(
+        self, point: OperatingPoint, film_factor: float
+    ) -> tuple[DrivenChannel, NDArray[np.float64], PressureDrop]:
+        """The channel with its flow, the factor on the film of each cell, and the pressure drop."""
         settings = self.spec.coolant
         inlet = point.coolant_inlet_temperature
         pressure = self.pressure_drop(point.coolant_flow, inlet)
         factor = film_factor * settings.film_factor.value * self.cell_factors(point.coolant_flow, inlet)
-        march = DrivenChannel(
+        driven = DrivenChannel(
             self.section,
             self.coolant,
             point.coolant_flow,
@@ -81,13 +105,8 @@ class CoolantLoop:
             self.cells.cell_area,
             self.film_choice(factor),
             pressure.pumping_power if settings.pumping_heat else 0.0,
-        ).settle(wall_temperature)
-        shape = self.cells.cell_area.shape
-        value, low, high = (
-            np.broadcast_to(factor * np.asarray(item), shape)
-            for item in (march.film.value, march.film.low, march.film.high)
         )
-        return CoolantState(march, value, low, high, pressure)
+        return driven, factor, pressure
 
     def film_choice(self, factor: ArrayLike) -> FilmChoice:
         """Film of the definition, times a factor."""

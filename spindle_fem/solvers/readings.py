@@ -17,6 +17,8 @@ from spindle_fem.solvers.prepared_machine import PreparedMachine
 
 Array = NDArray[np.float64]
 CoolantAt = Callable[[float], tuple[OperatingPoint, float]]
+# Samples whose coolant is marched at once.
+MOST_WALLS = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,13 +129,20 @@ class ReadingRows:
 
     def _coolant_outlet(self, outputs: Array, times: Array, coolant_at: CoolantAt) -> Array:
         builder = self.machine.builder
-        walls = outputs[:, outputs.shape[1] - builder.cells.cell_area.size :]
+        shape = builder.cells.cell_area.shape
+        walls = outputs[:, outputs.shape[1] - builder.cells.cell_area.size :].reshape(-1, *shape)
+        given = [coolant_at(float(time)) for time in times]
+        alike: dict[tuple[float, float, float], list[int]] = {}
+        for index, (point, factor) in enumerate(given):
+            # what the coolant's march knows of an operating point
+            state = (point.coolant_flow, point.coolant_inlet_temperature, factor)
+            alike.setdefault(state, []).append(index)
         found = np.empty(len(times))
-        for index, time in enumerate(times):
-            wall = walls[index].reshape(builder.cells.cell_area.shape)
-            point, factor = coolant_at(float(time))
-            state = builder.coolant_loop.at(point, wall, film_factor=factor)
-            found[index] = state.march.march.mixed_outlet_temperature
+        for own in alike.values():
+            point, factor = given[own[0]]
+            for begin in range(0, len(own), MOST_WALLS):
+                some = own[begin : begin + MOST_WALLS]
+                found[some] = builder.coolant_loop.outlets(point, walls[some], film_factor=factor)
         return found
 
 

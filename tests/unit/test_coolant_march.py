@@ -98,6 +98,17 @@ def test_parallel_starts_are_independent_and_mix():
     assert march.imbalance_relative < 1e-12
 
 
+@pytest.mark.parametrize("properties_at", ["inlet", "local"])
+def test_outlets_over_many_walls_are_those_of_each(properties_at):
+    section = ChannelSection(0.108, 0.010, 0.012, 0.024, 5.0, starts=2)
+    walls = INLET + np.random.default_rng(1).uniform(2.0, 25.0, size=(7, 2, 6))
+    choice = FilmChoice("sieder_tate", properties_at, 0.8)
+    channel = DrivenChannel(section, OIL, FLOW, INLET, np.full(6, 0.026), choice, 30.0)
+    each = [channel.settle(wall).march.mixed_outlet_temperature for wall in walls]
+    np.testing.assert_allclose(channel.outlets(walls), each, rtol=0.0, atol=1e-7)
+    assert np.ptp(each) > 0.01
+
+
 @pytest.mark.parametrize("shape", [(5,), (2, 6)])
 def test_maps_give_heat_bulk_and_outlet_of_the_march(shape):
     rng = np.random.default_rng(5)

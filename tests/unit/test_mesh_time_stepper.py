@@ -295,7 +295,7 @@ def test_blocks_that_do_not_fit_are_refused():
 
 
 def test_steps_follow_the_trend_of_their_error():
-    """While a machine relaxes, steps of one error grow; each is about as long as the error asked for lets it."""
+    """While a machine relaxes, each step is about as long as the error asked for lets it."""
     result = integrate(PROBLEM, START, 5e4, control=StepControl(tolerance=0.01, first_step=0.5))
     # The last steps are cut to end in time.
     sizes, errors = np.diff(result.step_times)[:-2], result.step_errors[:-2]

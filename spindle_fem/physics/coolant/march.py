@@ -304,6 +304,34 @@ class DrivenChannel:
                 f"walls of {given} starts are given, the channel has {self.section.starts}.",
                 "Give every start, or one that stands for all.",
             )
+        found = self._settled(wall)
+        if self.choice.properties_at == "inlet":
+            return found
+        return replace(found, march=_with_true_enthalpy(found.march, self.coolant, float(found.mass_flow)))
+
+    def outlets(self, walls: ArrayLike) -> NDArray[np.float64]:
+        """Mixed outlet temperature over many walls, (m,) [K], as :meth:`settle` has it for each.
+
+        Parameters
+        ----------
+        walls : (m, n_starts, n) array_like, [K]
+
+        Raises
+        ------
+        OutOfValidityError, ConvergenceError
+            As :meth:`settle`.
+        """
+        outlet = self._settled(walls).march.outlet_temperature
+        mixed = outlet.mean(axis=-1)
+        return mixed if self.choice.properties_at == "inlet" else _mixed(self.coolant, outlet, mixed)
+
+    def _settled(self, wall: ArrayLike) -> ChannelMarch:
+        """A march with properties at its own temperatures.
+
+        Raises
+        ------
+        ConvergenceError
+        """
         found = self.march(wall)
         if self.choice.properties_at == "inlet":
             return found
@@ -312,9 +340,7 @@ class DrivenChannel:
             found = self.march(wall, found)
             change = float(np.max(np.abs(found.march.bulk_temperature - bulk)))
             if change <= _TEMPERATURE_TOLERANCE_K:
-                return replace(
-                    found, march=_with_true_enthalpy(found.march, self.coolant, float(found.mass_flow))
-                )
+                return found
         raise ConvergenceError(
             "coolant march",
             f"bulk temperature still changes by {change:.3g} K after {_ITERATIONS} iterations.",
@@ -327,12 +353,18 @@ def _with_true_enthalpy(march: MarchResult, coolant: Coolant, mass_flow: float) 
     inlet, outlet_rise = float(march.edge_temperature.flat[0]), march.edge_rise[..., -1:]
     capacity = _mean_heat_capacity(coolant, inlet, np.zeros_like(outlet_rise), outlet_rise)
     rise = mass_flow * float(np.sum(capacity * outlet_rise))
-    mixed_enthalpy = float(np.mean(coolant.specific_enthalpy(march.outlet_temperature)))
-    mixed = march.mixed_outlet_temperature
-    for _ in range(3):
-        error = float(coolant.specific_enthalpy(mixed)) - mixed_enthalpy
-        mixed -= error / float(coolant.properties(mixed).specific_heat_capacity)
+    mixed = float(_mixed(coolant, np.ravel(march.outlet_temperature), march.mixed_outlet_temperature))
     return replace(march, enthalpy_rise=rise, mixed_outlet_temperature=mixed)
+
+
+def _mixed(coolant: Coolant, outlet: NDArray[np.float64], near: ArrayLike) -> NDArray[np.float64]:
+    """Temperature of equal streams (..., n_starts) mixed, by enthalpy, from one near it (...)."""
+    mixed_enthalpy = np.mean(coolant.specific_enthalpy(outlet), axis=-1)
+    mixed = near
+    for _ in range(3):
+        error = coolant.specific_enthalpy(mixed) - mixed_enthalpy
+        mixed = mixed - error / coolant.properties(mixed).specific_heat_capacity
+    return mixed
 
 
 def _mean_heat_capacity(
