@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from . import machine as m
+from .nose_growth import nose_shift
 
 Groups = dict[str, tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]
 
@@ -317,15 +318,12 @@ def _read(b: _Builder, readings: dict[str, NDArray[np.float64]]) -> None:
         vector = np.zeros(b.size)
         np.add.at(vector, b.index[chosen], volume[chosen])
         readings[f"mean:{name}"] = vector / vector.sum()
-    # Mean over sections, each as long as it is: what stretches a body along the axis.
-    for name, part, z0, z1 in m.STRETCHES:
-        between = (b.z_mid > z0) & (b.z_mid < z1)
-        chosen = (b.part == m.PARTS.index(part)) & between
-        section = np.where(chosen, volume, 0.0)
-        share = section / np.maximum(section.sum(axis=(0, 1)), 1e-30) * b.dz
-        vector = np.zeros(b.size)
-        np.add.at(vector, b.index[chosen], share[chosen])
-        readings[f"stretch:{name}"] = vector / vector.sum()
+    # Not a mean: m/K, of a cell's sectors one share each.
+    i, t, k = np.nonzero(b.index >= 0)
+    cell = nose_shift(b.grid)
+    vector = np.zeros(b.size)
+    np.add.at(vector, b.index[i, t, k], (cell / np.maximum((b.index >= 0).sum(axis=1), 1))[i, k])
+    readings["growth:nose"] = vector
     for bearing in m.BEARINGS:
         (z0, z1, _, radius) = m._STANDING[f"{bearing}.outer"][0]
         vector = b.weights(b.boundary("r", radius * 1e-3, z0 * 1e-3, z1 * 1e-3, -1))

@@ -18,7 +18,6 @@ from . import machine as m
 from .ball_set import (
     ASSEMBLED_AT,
     FRONT,
-    IRON_EXPANSION,
     POISSON,
     REAR,
     YOUNG,
@@ -46,7 +45,7 @@ PLACES = {"F": (0.057, 0.081, 0.125), "R": (0.441, 0.473)}
 SIDES = {"F": (1, 1, -1), "R": (1, -1)}
 NAMES = {"F": ["F1", "F2", "F3", "front_bearings"], "R": ["R1", "R2", "rear_bearings"]}
 SPACER = {"F": "mean:front_spacer.inner", "R": "mean:rear_spacer.inner"}
-SHAFT_EXPANSION, DENSITY = 12.5e-6, 7850.0
+DENSITY = 7850.0
 # Segments of the shaft from the nose to F3 that a turning shaft shortens: length, bore, outside in m.
 TURNING = ((0.045, 0.030, 0.090), (0.080, 0.030, 0.070))
 # µm; of the displacement sensor.
@@ -122,16 +121,12 @@ class CoupledPreload(Law):
 
 
 def displacement(model: ReducedSpindle, path: Path, speed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far the nose has moved forward from the flange's back, µm.
+    """How far the nose has moved forward from the flange's back since assembly, µm.
 
-    Free stretch of the shaft from the nose to F3, less that of the housing between flange and F3; a turning
-    shaft becomes shorter as it spreads.
+    By ``nose_growth``; a turning shaft becomes shorter as it spreads.
     """
-    found = np.zeros(len(path.time))
-    signs = {"nose": SHAFT_EXPANSION, "flange": -IRON_EXPANSION}
-    for name, _, z0, z1 in m.STRETCHES:
-        row = model.readings[model.reading_names.index(f"stretch:{name}")]
-        found += signs[name] * (z1 - z0) * (path.states @ row - ASSEMBLED_AT)
+    row = model.readings[model.reading_names.index("growth:nose")]
+    found = (path.states - ASSEMBLED_AT * model.uniform) @ row
     turning = (speed * np.pi / 30.0) ** 2
     for length, bore, outside in TURNING:
         found -= length * POISSON * DENSITY * turning * (bore**2 + outside**2) / (2.0 * YOUNG)

@@ -52,8 +52,6 @@ PROBE_PLACES = {
     "SP01": (0.096, 0.057), "SP02": (0.096, 0.081), "SP03": (0.096, 0.125),
     "SP04": (0.091, 0.290), "SP05": (0.0835, 0.457),
 }  # fmt: skip
-# What moves the nose: the shaft from it to F3, the housing from the flange's back to F3; part, m.
-STRETCHES = (("nose", "shaft", 0.0, 0.125), ("flange", "housing", 0.065, 0.125))
 BALL_CAPACITY = {"F": 170.0, "R": 119.0}
 BALL_CONDUCTANCE = {"F": 4.0, "R": 3.0}
 INNER_SEAT, OUTER_SEAT, AXIAL_CONTACT = 10_000.0, 4_000.0, 8_000.0

@@ -220,7 +220,10 @@ def load_reduced(
     """Read the reduced spindle from the cache, or build it (a minute or two) and keep it."""
     folder = (cache or DEFAULT_CACHE).expanduser()
     here = Path(__file__).parent
-    text = b"".join((here / name).read_bytes() for name in ("machine.py", "finite_volume.py", "reduction.py"))
+    text = b"".join(
+        (here / name).read_bytes()
+        for name in ("machine.py", "finite_volume.py", "nose_growth.py", "reduction.py")
+    )
     key = hashlib.sha256(text + repr((sectors, refine, size, draws, deviation)).encode()).hexdigest()[:16]
     path = folder / f"spindle_{key}.npz"
     names = ReducedSpindle.__slots__

@@ -65,7 +65,7 @@ def reduced(tmp_path_factory):
     return load_reduced(tmp_path_factory.mktemp("cache"), sectors=8, size=60, draws=1)
 
 
-def test_the_nose_moves_by_the_stretch_of_shaft_and_housing(reduced):
+def test_an_even_rise_moves_the_nose_as_shaft_and_housing_expand(reduced):
     path = Path(np.zeros(1), 30.0 * reduced.uniform[None], np.zeros((1, 6)))
     still, fast = (displacement(reduced, path, np.array([rpm]))[0] for rpm in (0.0, 3000.0))
     assert still == pytest.approx(1e7 * (12.5e-6 * 0.125 - 10.5e-6 * 0.060), rel=1e-3)
