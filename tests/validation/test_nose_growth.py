@@ -1,4 +1,4 @@
-"""Elasticity of the concealed machines' nose: exact bodies, and the elastic bodies of the product beside it."""
+"""Elasticity of the concealed machines' nose: exact bodies, and the elastic bodies of the product."""
 
 import numpy as np
 import pytest
