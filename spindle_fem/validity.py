@@ -102,6 +102,7 @@ CHANGES_RESULT = (
     "coolant_pressure",
     "coolant_flow_limited",
     "balls_unloaded",
+    "no_heat_to_air",
 )
 _HARMS = (
     "grease_temperature",

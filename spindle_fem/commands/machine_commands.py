@@ -106,6 +106,7 @@ def check_machine(
     from spindle_fem.definition.network_load import is_network_machine
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
+    from spindle_fem.operation.operating_limits import lost_to_air
 
     if picture is not None and picture.suffix != ".png":
         raise SpecError(str(picture), f'"{picture.suffix}" is no format of pictures.', "Allowed: .png.")
@@ -154,7 +155,7 @@ def check_machine(
             {"name": item.where, "detail": item.rule} for item in examine_machine(machine, overrides).assumed
         ],
         "warnings": [
-            *_lost_to_air(spec),
+            *({"code": item.code, "text": item.text} for item in lost_to_air(spec)),
             *({"code": "geometry_note", "text": note} for note in assembly.notes),
         ],
     }
@@ -257,19 +258,6 @@ def _draw_faults(picture: Path, machine: str | Path, overrides: Iterable[str], e
     with contextlib.suppress(FaultsError):  # of overrides, which are among the faults
         spec = examine_machine(machine, overrides).spec
     draw_definition(picture, spec, error.faults)
-
-
-def _lost_to_air(spec: MachineSpec) -> list[dict[str, str]]:
-    """Warning for a machine without any stationary surface that loses heat to its surroundings."""
-    standing = {part.name for part in spec.part if not part.rotating}
-    cooled = {name for film in spec.film for name in film.surface}
-    if any(surface.name in cooled and surface.part in standing for surface in spec.surface):
-        return []
-    text = (
-        "No surface of a standing part has a [[film]]: its heat leaves by the coolant only. "
-        'surroundings = "workshop" gives the outer surfaces one.'
-    )
-    return [{"code": "no_heat_to_air", "text": text}]
 
 
 def _source_detail(source: HeatSource) -> str:

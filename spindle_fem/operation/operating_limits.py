@@ -10,6 +10,7 @@ from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.units import ZERO_CELSIUS_K
+from spindle_fem.validity import CodedWarning
 
 
 def require_possible_operation(spec: MachineSpec) -> None:
@@ -38,6 +39,24 @@ def require_possible_speeds(spec: MachineSpec, speeds: Iterable[float], where: s
         reason = too_fast(spec, speed)
         if reason is not None:
             raise SpecError(where, f"{speed * 30.0 / math.pi:.0f} rpm.", reason)
+
+
+def lost_to_air(spec: MachineSpec) -> tuple[CodedWarning, ...]:
+    """Warning of a machine whose standing surfaces all lose no heat to its surroundings."""
+    standing = {part.name for part in spec.part if not part.rotating}
+    cooled = {
+        name
+        for film in spec.film
+        if not (film.kind == "constant" and film.coefficient.value == 0.0)
+        for name in film.surface
+    }
+    if any(surface.name in cooled and surface.part in standing for surface in spec.surface):
+        return ()
+    text = (
+        "No surface of a standing part loses heat by a [[film]]: all of it leaves by coolants and rotating "
+        'parts. surroundings = "workshop" gives the outer surfaces one.'
+    )
+    return (CodedWarning("no_heat_to_air", text),)
 
 
 def _faults(spec: MachineSpec) -> Iterator[SpecError]:

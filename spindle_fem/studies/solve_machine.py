@@ -15,6 +15,7 @@ from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
 from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.circuits import stream_answer
+from spindle_fem.operation.operating_limits import lost_to_air
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.pump import PUMP_PRESSURE
 from spindle_fem.results.thermal_result import (
@@ -143,7 +144,11 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     circuits = _circuits(machine, point, coupled)
     if circuits:
         done.append(checks.check_circuits(circuit_mismatch(machine, solution, coupled.loads)))
-    warnings += [*_pump_pressure(spec, coolant), *_omitted_preload(spec, point, coupled, around)]
+    warnings += [
+        *lost_to_air(spec),
+        *_pump_pressure(spec, coolant),
+        *_omitted_preload(spec, point, coupled, around),
+    ]
     for lubricant in _lubricants(spec, bearings):
         done.append(lubricant)
         if not lubricant.passed:

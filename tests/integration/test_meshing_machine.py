@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomli_w
 
 from scripts.design_space import draw_valid_designs
+from scripts.random_machines import draw_machine
 from spindle_fem.cache import CACHE_VARIABLE
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import GeometryError, MeshQualityError, MeshTagError
@@ -25,9 +27,9 @@ from spindle_fem.machine.geometry.part_shapes import (
 from spindle_fem.machine.geometry.step_file import export_step
 from spindle_fem.machine.meshing.build_mesh import build_mesh, generate_mesh
 from spindle_fem.machine.meshing.classify_faces import classify_face
-from spindle_fem.machine.meshing.generate import Attempt
+from spindle_fem.machine.meshing.generate import LADDER, Attempt
 from spindle_fem.machine.meshing.quality import area_errors, facet_areas, gmsh_quality, volume_errors
-from spindle_fem.machine.meshing.sizes import build_sizes
+from spindle_fem.machine.meshing.sizes import build_sizes, edge_sizes
 
 
 def ring(z_start, z_end, inner, outer):
@@ -219,6 +221,22 @@ def test_second_attempt_is_noted(machine, monkeypatch):
     made = generate_mesh(machine, build_sizes(machine, "coarse"))
     (note,) = made.notes
     assert note == f"meshed with {second.describe()} after {first.describe()}: gmsh gave up."
+
+
+@pytest.mark.slow
+def test_thin_walls_mesh_with_short_chords(tmp_path):
+    """A jacket of 3 mm around an annulus of 3.4 mm, which long chords flatten."""
+    path = tmp_path / "thin.toml"
+    path.write_text(tomli_w.dumps(draw_machine(np.random.default_rng([2, 146]))), encoding="utf-8")
+    assembly = build_assembly(load_machine(path))
+    sizes = build_sizes(assembly, "coarse")
+    thin = next(attempt for attempt in LADDER if attempt.clearance_share == 0.15)
+    assert sum(edge_sizes(assembly, sizes, 0.15)) < sum(edge_sizes(assembly, sizes))
+    with pytest.raises(MeshQualityError, match="distorted elements"):
+        generate_mesh(assembly, sizes, ladder=LADDER[:1])
+    made = generate_mesh(assembly, sizes, ladder=(thin,))
+    assert made.min_quality > 0.15
+    assert made.n_elements < 60_000
 
 
 def test_best_attempt_below_the_aim_is_kept_and_said_so(machine, monkeypatch):

@@ -13,10 +13,12 @@ from spindle_fem.definition.load import examine, find_machine, load_machine, rea
 from spindle_fem.errors import FaultsError
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
+from spindle_fem.operation.operating_limits import lost_to_air
 from spindle_fem.report import run_report
 from spindle_fem.studies.heat_study import RPM, usual_speeds
 from spindle_fem.studies.solve_machine import _pump_pressure
-from spindle_fem.validity import CodedWarning, by_consequence
+from spindle_fem.units import Uncertain
+from spindle_fem.validity import CHANGES_RESULT, CodedWarning, by_consequence
 
 PAGE = find_machine("motor_spindle")
 
@@ -115,6 +117,17 @@ def test_a_machine_that_loses_no_heat_to_air_is_warned_of() -> None:
     removed += ["film.outside=none", "film.mount=none"]
     codes = [item["code"] for item in check_machine("small_two_start", overrides=removed)["warnings"]]
     assert "no_heat_to_air" in codes
+    # A run says so as well, above what its checks say.
+    spec = load_machine("small_two_start", removed)
+    assert [item.code for item in lost_to_air(spec)] == ["no_heat_to_air"]
+    assert "no_heat_to_air" in CHANGES_RESULT
+    mounted = load_machine("small_two_start", [*removed[:2], "film.outside=none"])
+    assert not lost_to_air(mounted)
+    still = [
+        film.model_copy(update={"coefficient": Uncertain(0.0)}) if film.name == "mount" else film
+        for film in mounted.film
+    ]
+    assert lost_to_air(mounted.model_copy(update={"film": tuple(still)}))
 
 
 def test_speeds_follow_the_machine() -> None:

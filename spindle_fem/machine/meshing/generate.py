@@ -13,7 +13,7 @@ from spindle_fem.machine.geometry.assembly import AssemblyGeometry
 from spindle_fem.machine.geometry.cad_solids import SolidModel, build_solids, gmsh_session
 from spindle_fem.machine.meshing.classify_faces import EXACT, FaceClass, classify_face
 from spindle_fem.machine.meshing.size_fields import set_sizes
-from spindle_fem.machine.meshing.sizes import MeshSizes
+from spindle_fem.machine.meshing.sizes import CLEARANCE_SHARE, MeshSizes
 
 LOGGER = logging.getLogger(__name__)
 
@@ -67,26 +67,30 @@ class LinearMesh:
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """One attempt at meshing: gmsh algorithms and a factor on all sizes."""
+    """One attempt at meshing: gmsh algorithms, a factor on all sizes, chords in thin walls."""
 
     surface_algorithm: int
     volume_algorithm: int
     size_factor: float
     optimize_threshold: float = 0.2
+    clearance_share: float = CLEARANCE_SHARE
 
     def describe(self) -> str:
         """Describe the attempt, for notes and logs."""
         surface = {5: "Delaunay", 6: "frontal Delaunay", 1: "MeshAdapt"}[self.surface_algorithm]
         volume = {10: "HXT", 1: "Delaunay"}[self.volume_algorithm]
-        return f"{surface} surfaces, {volume} volumes, sizes x {self.size_factor:g}"
+        thin = "" if self.clearance_share == CLEARANCE_SHARE else ", short chords in thin walls"
+        return f"{surface} surfaces, {volume} volumes, sizes x {self.size_factor:g}{thin}"
 
 
 LADDER = (
     Attempt(6, 10, 1.0),
     Attempt(5, 10, 1.0),
+    Attempt(6, 10, 1.0, clearance_share=0.15),
     Attempt(6, 10, 0.85, 0.35),
     Attempt(5, 10, 0.7, 0.35),
     Attempt(6, 1, 0.7, 0.35),
+    Attempt(6, 10, 0.85, 0.35, clearance_share=0.05),
 )
 
 
@@ -105,7 +109,7 @@ def mesh_once(assembly: AssemblyGeometry, sizes: MeshSizes, attempt: Attempt, th
     with gmsh_session(threads) as geometry:
         solids = build_solids(assembly, geometry)
         _set_options(attempt, threads)
-        set_sizes(assembly, sizes.scaled(attempt.size_factor))
+        set_sizes(assembly, sizes.scaled(attempt.size_factor), attempt.clearance_share)
         try:
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises nothing more specific

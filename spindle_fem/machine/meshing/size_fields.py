@@ -9,7 +9,7 @@ from spindle_fem.machine.geometry.assembly import AssemblyGeometry
 from spindle_fem.machine.geometry.channel_geometry import PortGeometry
 from spindle_fem.machine.geometry.meridian import MeridianMap
 from spindle_fem.machine.meshing.classify_faces import EXACT, port_coordinates
-from spindle_fem.machine.meshing.sizes import MeshSizes, edge_sizes
+from spindle_fem.machine.meshing.sizes import CLEARANCE_SHARE, MeshSizes, edge_sizes
 
 # A wall is tight when it needs sizes below this share of the channel's.
 _TIGHT = 0.7
@@ -17,12 +17,12 @@ _TIGHT = 0.7
 _CORNER_GROWTH = 0.8
 
 
-def set_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> None:
+def set_sizes(assembly: AssemblyGeometry, sizes: MeshSizes, clearance_share: float = CLEARANCE_SHARE) -> None:
     """Give the open model its sizes; gmsh carries those of corners inwards."""
     import gmsh
 
     wanted: dict[tuple[int, int], float] = {}
-    for edge, size in zip(assembly.edges, edge_sizes(assembly, sizes), strict=True):
+    for edge, size in zip(assembly.edges, edge_sizes(assembly, sizes, clearance_share), strict=True):
         for z, r in ((edge.z[0], edge.r[0]), (edge.z[1], edge.r[1])):
             key = _micrometres(z, r)
             wanted[key] = min(wanted.get(key, size), size)

@@ -160,15 +160,22 @@ def build_sizes(
 
 # Largest sagitta h² / 8 r of a chord over the clearance to the next cylinder, and
 # over the width of a plane face beside it, where curving must not flatten elements.
-_CLEARANCE_SHARE = 1.0 / 3.0
+CLEARANCE_SHARE = 1.0 / 3.0
 _STRIP_SHARE = 0.10
 
 
-def edge_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> list[float]:
+def edge_sizes(
+    assembly: AssemblyGeometry, sizes: MeshSizes, clearance_share: float = CLEARANCE_SHARE
+) -> list[float]:
     """Element size at each meridian edge, m.
 
     That of its parts, less where a face is narrow, where its circle would have
     too few segments, or where chords would cut into a face close by.
+
+    Parameters
+    ----------
+    clearance_share : float
+        Largest sagitta of a chord over the clearance to the next cylinder.
     """
     chosen = []
     for edge in assembly.edges:
@@ -180,7 +187,7 @@ def edge_sizes(assembly: AssemblyGeometry, sizes: MeshSizes) -> list[float]:
             size = min(size, 2.0 * math.pi * (edge.r[0] or edge.r[1]) / sizes.circle_segments)
         if edge.is_cylinder and not edge.is_axis:
             clearance = _radial_clearance(edge, assembly)
-            size = min(size, math.sqrt(8.0 * edge.r[0] * _CLEARANCE_SHARE * clearance))
+            size = min(size, math.sqrt(8.0 * edge.r[0] * clearance_share * clearance))
         elif not edge.is_axis and edge.r[0] > 0.0:
             size = min(size, math.sqrt(8.0 * edge.r[0] * _STRIP_SHARE * length))
         chosen.append(size)
