@@ -14,11 +14,11 @@ import numpy as np
 from spindle_fem.definition.load import load_machine, write_machine
 from spindle_fem.model.mesh.evaluate import temperature_at_nodes
 from spindle_fem.model.mesh.thermal_state import ThermalState
-from spindle_fem.model.reduced.defined_effects import physics_of
 from spindle_fem.report.transient_report import write_transient_figures, write_transient_report
 from spindle_fem.results.field_series import FieldSeries
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.run_log import LOGGER
+from spindle_fem.solvers.mesh_terms import NO_PHYSICS
 from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.solvers.saved_state import load_state, save_state
 from spindle_fem.studies.shipped_files import find_study
@@ -70,7 +70,12 @@ def run_transient_study(
     spec = load_machine(asked.machine if machine is None else machine, overrides)
     with output_folder(folder) as place:
         prepared = prepare_machine(spec, progress=progress)
-        physics = physics_of(prepared)
+        physics = NO_PHYSICS
+        if spec.effects:
+            # loaded where needed: what effects read brings the fast model and recordings along
+            from spindle_fem.model.reduced.defined_effects import physics_of
+
+            physics = physics_of(prepared)
         with _fields(place / FIELDS, prepared, asked) as add_field:
             result = run_study(
                 prepared,
