@@ -18,6 +18,7 @@ Appl. Numer. Math. 20, 21-37.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -70,26 +71,18 @@ def error_defect(step: float, rates: tuple[Value, Value, Value]) -> Value:
     )
 
 
-def extrapolated_end(start: Value, middle: Value, before: Value | None = None, ratio: float = 1.0) -> Value:
-    """First guess of ``u₂``: on the line through ``u₀`` and ``u₁``, or on a parabola.
+def extrapolated(places: Sequence[float], values: Sequence[Value], at: float) -> Value:
+    """The polynomial through values at some places, at another place: a first guess of a stage.
 
-    Parameters
-    ----------
-    start, middle : float or ndarray
-        ``u₀`` and ``u₁``.
-    before : float or ndarray, optional
-        The value at the start of the step before.
-    ratio : float, [-]
-        Length of that step relative to this one.
-
-    >>> round(float(extrapolated_end(0.0, GAMMA**2, before=4.0, ratio=2.0)), 12)
-    1.0
+    >>> extrapolated((0.0, 1.0), (1.0, 3.0), 2.0)
+    5.0
+    >>> extrapolated((0.0, 1.0, 3.0), (0.0, 1.0, 9.0), 4.0)
+    16.0
     """
-    line = start + (middle - start) / GAMMA
-    if before is None:
-        return line
-    curvature = ((middle - start) / GAMMA - (start - before) / ratio) / (GAMMA + ratio)
-    return line + (1.0 - GAMMA) * curvature
+    weights = [
+        np.prod([(at - other) / (place - other) for other in places if other != place]) for place in places
+    ]
+    return sum(float(weight) * value for weight, value in zip(weights, values, strict=True))
 
 
 def interpolate_step(place: Value, start: Value, middle: Value, end: Value) -> Value:

@@ -137,7 +137,6 @@ def simulate_full(
     marks = np.concatenate(
         (
             history.breakpoints(options.input_resolution),
-            np.asarray(watch.looks, dtype=float),
             np.array(physics.breakpoints()),
         )
     )
@@ -161,7 +160,7 @@ def simulate_full(
         start,
         end,
         control=options.control(),
-        stops=StopTimes(marks.tolist(), restarts.tolist()),
+        stops=StopTimes(marks.tolist(), restarts.tolist(), watch.looks),
         outputs=rows.rows,
         sample_times=samples[samples >= start.time],
         observer=run.observe,

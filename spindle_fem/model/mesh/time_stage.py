@@ -25,8 +25,7 @@ from spindle_fem.model.trbdf2 import (
     DIAGONAL,
     GAMMA,
     error_defect,
-    extrapolated_end,
-    interpolate_step,
+    extrapolated,
     right_of_end,
     right_of_middle,
 )
@@ -121,6 +120,7 @@ class StageSolver:
         self._storage = system.tied().beside_full(self._tied_storage, np.diag(lumped_capacity))
         self._kept = _Kept()
         self._recent = RecentCorrections()
+        self._origin = (start.time, 1.0)
         self._shift = 0.0
         self._iteration = StageIteration()
         self.linear_iterations = 0
@@ -145,15 +145,20 @@ class StageSolver:
     def take_step(self, state: ThermalState, end: float, size: float) -> list[Stage]:
         """The three stages of a step from a state."""
         first = self._first_stage(state)
-        guess = first.unknowns
-        if self._kept.before is not None:
+        begin, inner = state.time, state.time + GAMMA * size
+        if self._kept.before is None:
+            self._origin = (begin, size)
+            guess = first.unknowns
+        else:
             length, earlier, middle = self._kept.before
-            guess = interpolate_step(1.0 + GAMMA * size / length, earlier, middle, first.unknowns)
+            times = (begin - length, begin - (1.0 - GAMMA) * length, begin)
+            guess = self._extrapolated(times, (earlier, middle, first.unknowns), inner)
         base = multiply(self._storage, first.unknowns)
-        middle = self._solve_stage(
-            right_of_middle(base, size, first.rate), state.time + GAMMA * size, size, guess, state
-        )
-        guess = self._extrapolated(first.unknowns, middle.unknowns, size)
+        middle = self._solve_stage(right_of_middle(base, size, first.rate), inner, size, guess, state)
+        times, values = (begin, inner), (first.unknowns, middle.unknowns)
+        if self._kept.before is not None:
+            times, values = (begin - length, *times), (earlier, *values)
+        guess = self._extrapolated(times, values, begin + size)
         last = self._solve_stage(
             right_of_end(base, size, first.rate, middle.rate),
             # inputs that jump at the end of the step are still the old ones there
@@ -182,10 +187,10 @@ class StageSolver:
         return ThermalState(end, last.values[:n], last.values[n:], step)
 
     def accept(self, stages: list[Stage], size: float) -> None:
-        """Remember the slope at the end of a step, for the next step's first guess."""
+        """Remember a step, for the next one's first guesses."""
         self._kept.before = (size, stages[0].unknowns, stages[1].unknowns)
 
-    def forget_slope(self) -> None:
+    def forget_steps(self) -> None:
         """Discard the data for initial guesses, because the inputs jump."""
         self._kept.before = None
 
@@ -201,13 +206,19 @@ class StageSolver:
 
     # -------------------------------------------------------------- details
     def _extrapolated(
-        self, first: NDArray[np.float64], middle: NDArray[np.float64], size: float
+        self, times: tuple[float, ...], values: tuple[NDArray[np.float64], ...], at: float
     ) -> NDArray[np.float64]:
-        """End of a step from its two stages and the start of the step before, on a parabola."""
-        if self._kept.before is None:
-            return extrapolated_end(first, middle)
-        length, earlier, _ = self._kept.before
-        return extrapolated_end(first, middle, earlier, length / size)
+        """First guess of a stage from earlier ones, on a polynomial in the logarithm of the time.
+
+        It counts from where the inputs last jumped, and the first step there: a machine that relaxes has
+        modes of all lengths, and while its steps grow it is in this variable that they are about equal.
+        """
+        begin, first = self._origin
+
+        def place(time: float) -> float:
+            return float(np.log1p(max(time - begin, 0.0) / first))
+
+        return extrapolated(tuple(map(place, times)), values, place(at))
 
     def _first_stage(self, state: ThermalState) -> Stage:
         problem = self._linear(self._inputs(state.time, state), state.temperature)

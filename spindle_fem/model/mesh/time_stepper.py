@@ -98,10 +98,13 @@ class StopTimes:
         Times where inputs jump.
     restarts : sequence of float, [s]
         Times where inputs jump and steps begin as at the start.
+    looks : sequence of float, [s]
+        Times where nothing jumps, but somebody looks.
     """
 
     breakpoints: Sequence[float] = ()
     restarts: Sequence[float] = ()
+    looks: Sequence[float] = ()
 
 
 NO_STOPS = StopTimes()
@@ -172,8 +175,8 @@ def integrate(
     solver = StageSolver(inputs, start, control)
     rows = solver.output_rows(outputs)
     samples = np.full((len(times), rows.shape[0]), np.nan)
-    marks = [t for t in (*stops.breakpoints, *stops.restarts) if start.time < t < end_time]
-    ends, anew = np.unique([*marks, end_time]), frozenset(stops.restarts)
+    kinks, anew = frozenset((*stops.breakpoints, *stops.restarts)), frozenset(stops.restarts)
+    ends = np.unique([*(t for t in (*kinks, *stops.looks) if start.time < t < end_time), end_time])
     first_step = control.first_step or 1e-4 * (end_time - start.time)
     step = start.step or first_step
     ledger = _Ledger(ends=[start.time])
@@ -221,8 +224,8 @@ def integrate(
             samples[inside] = interpolate_step(place, *(rows @ stage.values for stage in stages))
         step = choice.following(step, size, error)
         solver.accept(stages, size)
-        if end in ends:
-            solver.forget_slope()
+        if end in kinks:
+            solver.forget_steps()
         if end in anew:
             step = first_step
             choice.forget()
