@@ -17,6 +17,8 @@ from spindle_fem.operation.circuits import (
     wall_cells,
 )
 from spindle_fem.physics.coolant.coolants.air import Air
+from spindle_fem.physics.coolant.duct_films.straight import nusselt_gnielinski_straight
+from spindle_fem.physics.coolant.duct_films.turning import nusselt_gazley
 from spindle_fem.physics.coolant.falling_film import nusselt_schnabel
 from spindle_fem.physics.coolant.rectangular_duct import laminar_numbers
 from spindle_fem.physics.coolant.regimes import ChannelState, select_film
@@ -210,3 +212,20 @@ def test_faults_say_what_is_allowed(table, fault):
     with pytest.raises(ValidationError) as raised:
         film_of({key: value for key, value in table.items() if value is not None})
     assert fault in str(raised.value)
+
+
+def test_falling_films_are_those_of_theory_where_there_is_one():
+    """Nusselt's film with Lévêque's entry, and developed, Nu = 1.885 on its thickness."""
+    for reynolds, prandtl, entry in ((300.0, 7.0, 1.0e-2), (50.0, 100.0, 1.0e-2), (300.0, 7.0, 0.1)):
+        # Gradient at the wall g δ/ν with δ³ = 3 ν² Re/g, on the length (ν²/g)^(1/3).
+        slope = np.cbrt(3.0 * reynolds) * prandtl * entry
+        leveque = 1.5 / math.gamma(4.0 / 3.0) * np.cbrt(slope / 9.0)
+        assert nusselt_schnabel(reynolds, prandtl, entry) == pytest.approx(leveque, rel=0.002)
+    developed = 0.25 * 7.541 / np.cbrt(3.0 * 5.0)
+    assert nusselt_schnabel(5.0, 7.0, 1.0e-9) == pytest.approx(developed, rel=0.007)
+
+
+def test_a_turning_gap_against_a_still_duct():
+    """Gazley's film is half again that of a smooth duct in which nothing turns."""
+    still = nusselt_gnielinski_straight(1.0e4, 0.7, 1.0e6)
+    assert nusselt_gazley(1.0e4, 0.7) / still == pytest.approx(1.5, abs=0.1)

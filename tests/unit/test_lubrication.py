@@ -13,7 +13,7 @@ from spindle_fem.operation.bearing_lubricants import SetLubricant, bearing_strea
 from spindle_fem.operation.circuits import capacity_rate, coolant_temperatures, stream_answer, stream_warnings
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment
-from spindle_fem.physics.coolant.lubrication_kind import flooded_fill, path_fill_parker
+from spindle_fem.physics.coolant.lubrication_kind import film_harris, flooded_fill, path_fill_parker
 from tests.support.oiled_machine import oiled
 
 RPM = math.pi / 30.0
@@ -180,3 +180,12 @@ def test_own_oils_need_no_name():
         "inlet_temperature": "30 degC",
     }
     assert np.isclose(Lubrication.model_validate(table).oil_flow, 1.0e-3 / 60.0)
+
+
+def test_film_of_oil_against_a_plate_at_the_speed_of_the_cage():
+    """Harris' film is 8 % below the mean one of a laminar boundary layer along the pitch diameter."""
+    rpm, viscosity, conductivity, prandtl, size, pitch = 10.0e3, 1.0e-5, 0.13, 150.0, 0.1, 0.09
+    cage = 0.5 * rpm * RPM * (1.0 - size) * 0.5 * pitch
+    plate = 0.664 * math.sqrt(cage * pitch / viscosity) * prandtl ** (1.0 / 3.0) * conductivity / pitch
+    found = float(film_harris(rpm, viscosity, conductivity, prandtl, size))
+    assert found == pytest.approx(plate / 1.09, rel=0.005)

@@ -90,7 +90,6 @@ LADDER = (
     Attempt(6, 10, 0.85, 0.35),
     Attempt(5, 10, 0.7, 0.35),
     Attempt(6, 1, 0.7, 0.35),
-    Attempt(6, 10, 0.85, 0.35, clearance_share=0.05),
 )
 
 

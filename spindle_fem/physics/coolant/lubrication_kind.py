@@ -104,7 +104,7 @@ def path_fill_parker(flow: Array, speed: Array, pitch: Array) -> Array:
     pitch : (n,) array_like, [mm]
 
     Source: Parker (1984), NASA Technical Paper 2275: 10⁵ W^0.37/(n d_m^1.7); 35 and 120 mm bore (their range
-    of flow and speed).
+    of flow and speed). Taken as cited: a few per cent at those flows.
 
     >>> float(path_fill_parker(7600.0, 20.0e3, 155.0).round(3))
     0.026
@@ -144,7 +144,8 @@ def film_harris(
         The latter is the element diameter times the cosine of the contact angle over the pitch diameter.
 
     Source: Crecelius & Pirvics (1976), as Harris & Kotzalas, Rolling Bearing Analysis, take it: laminar
-    flow along a plate at the speed of the cage.
+    flow along a plate at the speed of the cage. The mean film of a plate as long as the pitch diameter
+    (0.664 Re^(1/2) Pr^(1/3)) is 9 % higher, as the tests hold.
 
     >>> float(film_harris(10.0e3, 1.0e-5, 0.13, 150.0, 0.1).round(0))
     2043.0
