@@ -226,6 +226,7 @@ def test_falling_films_are_those_of_theory_where_there_is_one():
 
 
 def test_a_turning_gap_against_a_still_duct():
-    """Gazley's film is half again that of a smooth duct in which nothing turns."""
-    still = nusselt_gnielinski_straight(1.0e4, 0.7, 1.0e6)
-    assert nusselt_gazley(1.0e4, 0.7) / still == pytest.approx(1.5, abs=0.1)
+    """Gazley's film is 1.6 to 1.7 times that of a smooth duct in which nothing turns."""
+    for reynolds in (1.0e4, 3.0e4, 1.0e5):
+        still = nusselt_gnielinski_straight(reynolds, 0.7, 1.0e6)
+        assert nusselt_gazley(reynolds, 0.7) / still == pytest.approx(1.65, abs=0.06)

@@ -23,8 +23,8 @@ def nusselt_gazley(reynolds: Array, prandtl: Array) -> Array:
         Measured with air; the range of both is assumed about what was measured.
 
     Source: Gazley (1958), Trans. ASME 80, 79–90, as Fénot et al. (2011), Int. J. Thermal Sciences 50,
-    1138–1155, have it: 0.03 Re^0.8, taken as cited. It is half again that of a smooth, still duct at the same
-    Reynolds number (Gnielinski), as the tests hold.
+    1138–1155, have it: 0.03 Re^0.8, taken as cited. It is 1.6 to 1.7 times that of a smooth, still duct
+    at the same Reynolds number (Gnielinski), as the tests hold.
 
     >>> float(nusselt_gazley(1.0e4, 0.7).round(1))
     47.5
