@@ -18,11 +18,10 @@ from spindle_fem.definition.network_tables import base_unit_of
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.inference.diagnosis_content import plain_data
 from spindle_fem.inference.measurement_plan import MeasurementPlan, plan_measurement
-from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine
+from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine, with_growth
 from spindle_fem.inference.plan_content import plan_content
 from spindle_fem.inference.planned_test import (
     LONGEST_COMPARED,
-    NOISE,
     STANDARD_TESTS,
     USUAL_RISE,
     Conditions,
@@ -82,8 +81,9 @@ def plan(
         A recording, whose inputs are used; or ``heat_up``, ``steps`` or ``cool_down``, with a length
         after a colon (``steps:4h``).
     sensors : sequence of str
-        Names of probes or nodes, each perhaps with its noise (``SP01=0.05K``); ``all=0.2K`` for all. By
-        default those of the recording, else every one of the definition.
+        Names of probes, nodes or displacement sensors, each perhaps with its noise (``SP01=0.05K``,
+        ``S1=0.5um``); ``all=0.2K`` for all temperatures. By default those of the recording, else every one
+        of the definition.
     inputs : sequence of str
         ``NAME=VALUE`` texts with units: inputs at full load in a standard test.
     calibrate : iterable of str or Path
@@ -166,7 +166,7 @@ def planned_measurement(
         if seconds <= 0.0:
             raise SpecError("test", f"its length is {seconds:g} s.", "Allowed: above 0 s.")
         schedule = conditions.standard_tests(seconds)[name]
-        chosen = _sensors(sensors, {probe: Sensor(probe, probe, NOISE) for probe in conditions.probes})
+        chosen = _sensors(sensors, conditions.sensors)
         asked, words = recording_of(conditions, schedule, chosen), schedule.name
         full = {name: _shown(value, conditions.units[name]) for name, value in conditions.usual.items()}
     else:
@@ -185,6 +185,7 @@ def planned_measurement(
     opened = open_machine(machine, overrides, recordings, earlier, progress=progress)
     # Usual sizes of effects, and of a network's errors, follow from what the sensors would read.
     opened = open_machine(machine, overrides, as_predicted(opened, recordings), earlier, progress=progress)
+    opened = with_growth(opened)
     found = plan_measurement(opened, schedules, asked=words, progress=progress)
     little = says_too_little(_only_first(opened))
     notes = [f"A diagnosis of such a recording would refuse it: {little}"] if little else []
@@ -233,15 +234,27 @@ def _sensors(asked: Sequence[str], known: Mapping[str, Sensor]) -> tuple[Sensor,
             )
         if found:
             where = f"sensors: noise of {name}"
-            noise[name] = to_si(given, "K", where=where, kind="temperature_difference")
+            moved = name != ALL and known[name].displaced
+            unit, kind = ("m", "quantity") if moved else ("K", "temperature_difference")
+            noise[name] = to_si(given, unit, where=where, kind=kind)
             if noise[name] <= 0.0:
-                raise SpecError(where, f"is {noise[name]:g} K.", "Allowed: above 0 K.")
+                raise SpecError(where, f"is {noise[name]:g} {unit}.", f"Allowed: above 0 {unit}.")
         if name != ALL:
             chosen.append(name)
-    return tuple(
-        replace(known[name], noise=noise.get(name, noise.get(ALL, known[name].noise)))
-        for name in dict.fromkeys(chosen or known)
-    )
+    found = [known[name] for name in dict.fromkeys(chosen or known)]
+    if all(item.displaced for item in found):
+        raise SpecError(
+            "sensors",
+            "read no temperature.",
+            f"Add one of {', '.join(name for name, item in known.items() if not item.displaced)}.",
+        )
+
+    def noise_of(item: Sensor, name: str) -> float:
+        usual = item.noise if item.displaced else noise.get(ALL, item.noise)
+        return noise.get(name, usual)
+
+    names = dict.fromkeys(chosen or known)
+    return tuple(replace(item, noise=noise_of(item, name)) for item, name in zip(found, names, strict=True))
 
 
 def _of_recording(
@@ -252,7 +265,10 @@ def _of_recording(
         probe: Sensor(name, probe, float(sigma))
         for name, probe, sigma in zip(read.temperature_names, read.probes, read.sigma, strict=True)
     }
-    others = {probe: Sensor(probe, probe, NOISE) for probe in conditions.probes if probe not in own}
+    if conditions.network is None:
+        moved = zip(read.displacement_names, read.displacement_sensors, read.displacement_sigma, strict=True)
+        own |= {probe: Sensor(name, probe, float(sigma), displaced=True) for name, probe, sigma in moved}
+    others = {name: item for name, item in conditions.sensors.items() if name not in own}
     names = [item for item in asked if item.partition("=")[0].strip() != ALL]
     chosen = _sensors(asked, own | others if names else own)
     return with_sensors(read, chosen, conditions.start), chosen

@@ -344,9 +344,9 @@ def _products(
         for item, white in zip(problem.observations, problem.whiteners, strict=True)
         if item.recording == number
     ]
-    # A further sensor reads as often as the others, with their usual noise.
-    first = own[0][0]
-    noise = float(np.median(predictor.recordings[number].sigma))
+    # A further sensor reads as often as the others, with the usual noise of a temperature.
+    first, recording = own[0][0], predictor.recordings[number]
+    noise = float(np.median(recording.sigma[: recording.temperature_count]))
     usual = Whitener(replace(first.bins, white=noise), problem.slow)
     own += [(replace(first, channel=read + i), usual) for i in range(len(places))]
     return ChannelProducts.of(

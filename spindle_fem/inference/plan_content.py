@@ -17,6 +17,7 @@ from spindle_fem.inference.measurement_plan import (
 )
 from spindle_fem.inference.planned_test import Sensor
 from spindle_fem.inference.told_apart import FALSE_ALARM, POWER
+from spindle_fem.recordings.displaced_readings import MICROMETRES
 
 SCHEMA = "spindle-fem/plan/1"
 # Effects that are listed for one, those that read most like it first.
@@ -57,7 +58,11 @@ def plan_content(
     return {
         "schema": SCHEMA,
         "machine": plan.machine.name,
-        "sensors": [{"name": item.name, "probe": item.probe, "noise_K": item.noise} for item in sensors],
+        "sensors": [
+            {"name": item.name, "probe": item.probe}
+            | ({"noise_um": MICROMETRES * item.noise} if item.displaced else {"noise_K": item.noise})
+            for item in sensors
+        ],
         "test": {
             "description": test,
             "length_s": float(np.ptp(recording.times)),

@@ -28,8 +28,9 @@ from spindle_fem.units import ANGULAR_SPEED_UNIT, TEMPERATURE_UNIT, ZERO_CELSIUS
 
 Array = NDArray[np.float64]
 
-# White noise of a reading [K] and length of a test of a machine with geometry [s], unless said otherwise.
-NOISE, LENGTH = 0.1, 4.0 * 3600.0
+# White noise of a temperature [K] and of a displacement [m], and length of a test of a machine with geometry
+# [s], unless said otherwise. (Judgement.)
+NOISE, DISPLACEMENT_NOISE, LENGTH = 0.1, 0.3e-6, 4.0 * 3600.0
 # A network is watched for so many of its slowest time constants, within these limits [s].
 TIME_CONSTANTS, SHORTEST, LONGEST = 4.0, 600.0, 24.0 * 3600.0
 # Distance of readings, s, and most of them: longer tests are read less often.
@@ -52,21 +53,24 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """Something that reads a temperature.
+    """Something that reads a temperature, or a displacement.
 
     Attributes
     ----------
     name : str
         Of its channel.
     probe : str
-        Probe or node that it reads.
-    noise : float, [K]
+        Probe, node or displacement sensor that it reads.
+    noise : float, [K, m]
         White, 1 σ.
+    displaced : bool
+        Whether it reads a displacement.
     """
 
     name: str
     probe: str
     noise: float
+    displaced: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +100,13 @@ class Conditions:
     assumed: tuple[str, ...] = ()
 
     @property
-    def probes(self) -> tuple[str, ...]:
-        """Everything that the definition can read."""
+    def sensors(self) -> dict[str, Sensor]:
+        """Everything that the definition can read, by name, with the usual noise."""
         if self.network is not None:
-            return self.network.node_names
-        return tuple(probe.name for probe in self.spec.probe)
+            return {name: Sensor(name, name, NOISE) for name in self.network.node_names}
+        warm = {item.name: Sensor(item.name, item.name, NOISE) for item in self.spec.probe}
+        moved = [item.name for item in self.spec.displacement_sensor]
+        return warm | {name: Sensor(name, name, DISPLACEMENT_NOISE, displaced=True) for name in moved}
 
     @property
     def default_length(self) -> float:
@@ -263,7 +269,7 @@ def recording_of(conditions: Conditions, schedule: Schedule, sensors: Sequence[S
 
 
 def with_sensors(recording: Recording, sensors: Sequence[Sensor], start: float) -> Recording:
-    """A recording as read by these sensors, at the temperature of its own start throughout.
+    """A recording as read by these sensors, at the temperature of its own start, undisplaced, throughout.
 
     Parameters
     ----------
@@ -271,21 +277,32 @@ def with_sensors(recording: Recording, sensors: Sequence[Sensor], start: float) 
         Where the recording does not read a probe.
     """
     first = recording.first_readings() if recording.temperature_names else {}
-    size = (recording.times.size, len(sensors))
-    level = np.array([first.get(item.probe, start) for item in sensors])
+    warm = [item for item in sensors if not item.displaced]
+    moved = [item for item in sensors if item.displaced]
+    size = (recording.times.size, len(warm))
+    level = np.array([first.get(item.probe, start) for item in warm])
+
+    def noises(own: Sequence[Sensor]) -> tuple[ChannelNoise, ...]:
+        return tuple(ChannelNoise(0.0, 0.0, item.noise, 0.0) for item in own)
+
     return replace(
         recording,
-        temperature_names=tuple(item.name for item in sensors),
-        probes=tuple(item.probe for item in sensors),
+        temperature_names=tuple(item.name for item in warm),
+        probes=tuple(item.probe for item in warm),
         temperature=np.broadcast_to(level, size).copy(),
         flags=np.zeros(size, dtype=np.uint8),
-        sigma=np.array([item.noise for item in sensors]),
-        noise=tuple(ChannelNoise(0.0, 0.0, item.noise, 0.0) for item in sensors),
+        sigma=np.array([item.noise for item in warm]),
+        noise=noises(warm),
+        displacement_names=tuple(item.name for item in moved),
+        displacement_sensors=tuple(item.probe for item in moved),
+        displacements=np.zeros((recording.times.size, len(moved))),
+        displacement_sigma=np.array([item.noise for item in moved]),
+        displacement_noise=noises(moved),
     )
 
 
 def as_predicted(machine: DiagnosedMachine, recordings: Sequence[Recording]) -> list[Recording]:
-    """The recordings with what the machine as it is known should have the sensors read.
+    """The recordings with the temperatures that the sensors should read of the machine as it is known.
 
     Parameters
     ----------

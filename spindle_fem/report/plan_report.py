@@ -175,7 +175,14 @@ def _more(content: Mapping[str, Any], pictures: Mapping[str, Any]) -> list[Any]:
 
 
 def _how(content: Mapping[str, Any]) -> list[Any]:
-    fields = (words("sensor", "name"), words("reads", "probe"), fixed("noise / K", "noise_K", 3))
+    fields = (
+        words("sensor", "name"),
+        words("reads", "probe"),
+        words(
+            "noise",
+            lambda item: f"{item['noise_K']:.3f} K" if "noise_K" in item else f"{item['noise_um']:.3f} µm",
+        ),
+    )
     steps = [
         f"A reading every {content['test']['interval_s']:g} s; a quarter of the time is kept back, as a "
         "diagnosis does.",
