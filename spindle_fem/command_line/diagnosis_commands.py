@@ -151,8 +151,9 @@ def plan(
         typer.Option(
             "--sensors",
             metavar="NAME[=NOISE],...",
-            help="Probes, nodes or displacement sensors that are read, with their noise: SP01,SP04=0.05K,S1=0.5um; "
-            "all=0.2K. Default: every one of the definition (or of the recording), 0.1 K and 0.3 um.",
+            help="Probes, nodes or displacement sensors that are read, with their noise: "
+            "SP01,SP04=0.05K,S1=0.5um; all=0.2K. Default: every one of the definition (or of the recording), "
+            "0.1 K and 0.3 um.",
         ),
     ] = None,
     inputs: Annotated[
