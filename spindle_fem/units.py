@@ -141,7 +141,7 @@ def _pure_number(number: Any, value: Any, unit: str, kind: str, where: str) -> f
         raise UnitError(
             where,
             f"bare number {_shown(value)}, a unit is needed.",
-            f"Write it as {quantity_example(unit, kind)}.",
+            f"Write it with its unit, such as {quantity_example(unit, kind)}.",
         )
     try:
         return float(number)

@@ -7,7 +7,11 @@ import itertools
 import pytest
 
 from spindle_fem.commands.checked_machine import load_buildable
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import FaultsError
+from spindle_fem.model.lumped.machine_network import build_machine_network
+from spindle_fem.operation.circuits import capacity_rate
+from spindle_fem.solvers.machine_network_steady import solve_machine_network
 from tests.support.page_machine import PAGE, TEN, TEN_OTHERS, draft
 
 
@@ -33,7 +37,13 @@ def require(faults: list[str], mistakes) -> None:
         )
     # Every fault says where, and what is allowed.
     assert all(fault.startswith("draft.toml: ") for fault in faults)
-    allowed = ("Allowed: ", "Write it as", "Names must differ", "Parts may touch", "Did you mean")
+    allowed = (
+        "Allowed: ",
+        "Write it with its unit, such as",
+        "Names must differ",
+        "Parts may touch",
+        "Did you mean",
+    )
     assert all(any(words in fault for words in allowed) for fault in faults), listing
 
 
@@ -42,6 +52,18 @@ def test_the_page_has_at_most_seventy_lines_and_is_a_machine(tmp_path):
     spec = load_buildable(written(tmp_path, PAGE), ())
     assert {kind.ball_material for kind in spec.bearing_types.values()} == {"silicon_nitride"}
     assert [film.fluid for film in spec.circuits] == ["ethylene_glycol_30"]
+
+
+def test_the_page_runs_and_its_jacket_takes_most_of_the_heat(tmp_path):
+    """900 W of the stator, 120 W of the rotor and what bearings rub; 0.8 kW/K of water and glycol."""
+    spec = load_machine(written(tmp_path, PAGE))
+    state = solve_machine_network(build_machine_network(spec))
+    jacket = state.boundary_heat["jacket"]
+    assert 1020.0 + 500.0 < state.heat_in < 1020.0 + 1600.0
+    assert 0.8 * state.heat_in < jacket < state.heat_in
+    warmed = jacket / capacity_rate(spec.circuits[0])
+    assert 1.5 < warmed < 3.5
+    assert all(at.inner > at.outer for at in state.bearing_temperatures().values())
 
 
 @pytest.mark.parametrize("mistakes", [TEN, TEN_OTHERS], ids=["ten", "ten others"])
