@@ -98,8 +98,8 @@ class Answer:
     Attributes
     ----------
     times : (n,) ndarray, [s]
-    readings : (n, c) ndarray, [K]
-        Channels of the recording, then places.
+    readings : (n, c) ndarray, [K, µm]
+        Channels of the recording, then places; displacements count from the start of the trial.
     slopes : (n, c, p) ndarray
         To the coordinates of the fit.
     """
@@ -159,6 +159,9 @@ def answer(
     times = times[times <= grid[-1]]
     whole = np.concatenate(readings, axis=1)
     by = np.concatenate(slopes, axis=1) * np.array([c.sigma for c, _ in chosen])
+    displaced = slice(predictor.recordings[0].temperature_count, told.temperature.shape[1])
+    for values in (whole, by):
+        values[:, displaced] -= values[0, displaced].copy()
     full = np.zeros((len(times), whole.shape[1], len(fit.coordinates)))
     full[:, :, [i for _, i in chosen]] = _at(times, grid, by)
     return Answer(times, _at(times, grid, whole), full)

@@ -12,7 +12,7 @@ with pairwise distances, Entropy 19, 361 (Bhattacharyya distance).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -67,14 +67,16 @@ class Option:
         Bhattacharyya distance of the readings under the two likeliest explanations.
     channel : str
         Where these two differ most clearly.
-    difference : float, [K]
+    difference : float, [K, µm]
         There, at the clearest instant.
-    spread : float, [K]
+    spread : float, [K, µm]
         1 σ of the difference from noise and unknown parameters.
     time : float, [s]
         When that instant is, from the start of the test.
-    levels : (float, float), [K]
+    levels : (float, float), [K, µm]
         What the two predict then.
+    displaced : bool
+        Whether the channel reads a displacement, which counts from the start of the test.
     """
 
     trial: Trial
@@ -86,6 +88,12 @@ class Option:
     spread: float
     time: float
     levels: tuple[float, float]
+    displaced: bool = False
+
+    @property
+    def unit(self) -> str:
+        """Of the difference, as keys have it."""
+        return "um" if self.displaced else "K"
 
     @property
     def effort(self) -> int:
@@ -139,7 +147,7 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
     listed = shortlist(options, best)
     return {
         "where": best.sensor if best.place is not None else f"{EXISTING}, above all {best.channel}",
-        "quantity": "temperature",
+        "quantity": "displacement" if best.displaced else "temperature",
         "condition": best.trial.name,
         "why": why(best, between, lead_words(diagnosis, decided))
         + timed_words([item.fit for item in rivals]),
@@ -151,8 +159,8 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
                 "condition": item.trial.name,
                 "expected_information": item.information,
                 "channel": item.channel,
-                "difference_K": item.difference,
-                "sigma_K": item.spread,
+                f"difference_{item.unit}": item.difference,
+                f"sigma_{item.unit}": item.spread,
                 "after_s": item.time,
                 "chosen": item is best,
             }
@@ -207,6 +215,7 @@ def evaluate(
     white = np.append(recording.sigma, np.full(len(places), float(np.median(recording.sigma[:read]))))
     step = float(np.median(np.diff(recording.times)))
     names = (*recording.temperature_names, *(place.words for place in places))
+    moved = recording.temperature_names[read:]
     options: list[Option] = []
     failed = []
     for trial in trials_of(predictor, diagnosis.view):
@@ -218,22 +227,47 @@ def evaluate(
         except NOT_SIMULATED as error:
             failed.append({"condition": trial.name, "reason": str(error)})
             continue
+        slow = diagnosis.final.slow
         noise = [
-            reading_covariance(answers[0].times, sigma, step, spacing, diagnosis.final.slow)
-            for sigma in white
+            reading_covariance(answers[0].times, sigma, step, spacing, slow)
+            if not read <= channel < count
+            else reading_covariance(
+                answers[0].times,
+                sigma,
+                step,
+                spacing,
+                slow.of(channel - count),
+                counted_from=float(trial.drive.grid[0]),
+            )
+            for channel, sigma in enumerate(white)
         ]
         for position in (None, *range(len(places))):
-            chosen = [*range(read), *([] if position is None else [count + position])]
+            chosen = [*range(count), *([] if position is None else [count + position])]
             place = None if position is None else places[position]
-            options.append(_option(trial, place, answers, fits, weights, chosen, noise, names))
+            option = _option(trial, place, answers, fits, weights, chosen, noise, names)
+            options.append(replace(option, displaced=place is None and option.channel in moved))
     return options, failed
 
 
-def reading_covariance(times: Array, sigma: float, step: float, spacing: float, slow: SlowError) -> Array:
-    """Covariance of means over ``spacing`` of one channel's readings, (n, n) K²."""
+def reading_covariance(
+    times: Array,
+    sigma: float,
+    step: float,
+    spacing: float,
+    slow: SlowError,
+    *,
+    counted_from: float | None = None,
+) -> Array:
+    """Covariance of means over ``spacing`` of one channel's readings, (n, n) K² or µm².
+
+    ``counted_from`` is the time [s] of the reading that the others are counted from, if from one.
+    """
     number = max(1.0, spacing / step)
+    if counted_from is not None:
+        times = np.append(counted_from, times)
     apart = np.abs(times[:, None] - times)
-    return slow.sigma**2 * np.exp(-apart / slow.time) + sigma**2 / number * np.eye(len(times))
+    found = slow.sigma**2 * np.exp(-apart / slow.time) + sigma**2 / number * np.eye(len(times))
+    return found if counted_from is None else found[1:, 1:] - found[1:, :1] - found[:1, 1:] + found[0, 0]
 
 
 def _option(
@@ -362,13 +396,14 @@ def lead_words(diagnosis: Diagnosis, decided: bool) -> str:
 def why(option: Option, between: Sequence[str], lead: str) -> str:
     """The reason in a sentence or two with numbers, after what leads to it."""
     digits = 1 if abs(option.difference) >= 0.2 else 2
-    levels = [f"{value - ZERO_CELSIUS_K:.{digits}f} °C" for value in option.levels]
+    zero, level, unit = (0.0, "µm", "µm") if option.displaced else (ZERO_CELSIUS_K, "°C", "K")
+    levels = [f"{value - zero:.{digits}f} {level}" for value in option.levels]
     at = option.channel if option.place is None else "the new sensor"
     text = (
         f"If it is {between[0]}, {at} reads {levels[0]} after {option.time / 60.0:.0f} min; "
-        f"if it is {between[1]}, {levels[1]}: they differ by {abs(option.difference):.2g} K, "
+        f"if it is {between[1]}, {levels[1]}: they differ by {abs(option.difference):.2g} {unit}, "
         f"{abs(option.difference) / option.spread:.1f} times what noise and unknown parameters leave "
-        f"({option.spread:.2g} K)."
+        f"({option.spread:.2g} {unit})."
     )
     if option.information < HARDLY:
         lead += "No single test tells these apart well; this one does it best. "

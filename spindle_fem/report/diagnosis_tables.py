@@ -260,8 +260,8 @@ def next_blocks(content: Mapping[str, Any]) -> list[Any]:
             words("operation", "condition"),
             fixed("information / bit", "expected_information", 2),
             words("clearest at", _clearest_channel),
-            fixed("difference / K", "difference_K", 2),
-            fixed("± 1 σ / K", "sigma_K", 2),
+            words("difference", lambda option: _in_its_unit(option, "difference")),
+            words("± 1 σ", lambda option: _in_its_unit(option, "sigma")),
             fixed("after / min", lambda option: option["after_s"] / 60.0, 0),
         )
         between = " and ".join(item.get("between", [])[:2])
@@ -272,6 +272,13 @@ def next_blocks(content: Mapping[str, Any]) -> list[Any]:
         for failed in item.get("not_simulated", [])
     ]
     return blocks
+
+
+def _in_its_unit(option: Mapping[str, Any], key: str) -> str:
+    """A difference of temperatures, or of displacements."""
+    if f"{key}_um" in option:
+        return f"{option[f'{key}_um']:.2f} µm"
+    return f"{option[f'{key}_K']:.2f} K"
 
 
 def _clearest_channel(option: Mapping[str, Any]) -> str:

@@ -24,6 +24,7 @@ from spindle_fem.inference.findings import (
 from spindle_fem.inference.growth_misdescriptions import growth_misdescriptions
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.next_measurement import EXISTING, next_measurement, reading_covariance
 from spindle_fem.inference.opened_machine import DiagnosedMachine, with_growth
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, expected_slow_error, known_before
@@ -42,7 +43,7 @@ from spindle_fem.recordings.compare import write_simulated
 from spindle_fem.recordings.conditions import operating_conditions
 from spindle_fem.recordings.displaced_readings import with_displacements
 from spindle_fem.report.diagnosis_data import diagnosis_dataset
-from spindle_fem.report.diagnosis_tables import channel_table
+from spindle_fem.report.diagnosis_tables import channel_table, next_blocks
 from spindle_fem.report.read_against_predicted import displaced_before_after
 from tests.support.nose_spindle import RUN, nose_machine, nose_recording
 
@@ -327,3 +328,30 @@ def test_the_dataset_of_a_diagnosis_keeps_displacements_apart(diagnosed):
     assert left[1] < 0.15e-6
     (shown, *_), _ = drawn_lines(displaced_before_after(data, 0))
     assert np.ptp(shown) == pytest.approx(1e6 * np.ptp(read), rel=1e-4)
+
+
+@pytest.mark.slow
+def test_the_next_measurement_reads_the_displacement(diagnosed):
+    """Alone with its own change since the start of the test; what differs there is told in micrometres."""
+    proposal = next_measurement(diagnosed)
+    there = [item for item in proposal["options"] if item["where"] == EXISTING]
+    moved = [item for item in there if item["channel"] == "S1"]
+    assert moved
+    for item in moved:
+        assert "difference_K" not in item
+        assert abs(item["difference_um"]) < 100.0
+        assert item["sigma_um"] > 0.1
+    assert "µm" in str(next_blocks({"next_measurement": proposal}))
+    words = proposal["why"]
+    assert ("µm" in words) == (proposal["quantity"] == "displacement")
+
+
+def test_a_displacement_counts_from_a_reading_with_its_own_error():
+    times, slow = np.array([600.0, 1200.0, 1e7]), SlowError(0.4, 900.0)
+    found = reading_covariance(times, 0.3, 60.0, 300.0, slow, counted_from=0.0)
+    white = 0.3**2 / 5.0
+    assert found[2, 2] == pytest.approx(2.0 * (0.4**2 + white))
+    assert found[0, 0] == pytest.approx(2.0 * 0.4**2 * (1.0 - np.exp(-600.0 / 900.0)) + 2.0 * white)
+    assert found[0, 2] == pytest.approx(0.4**2 * (1.0 - np.exp(-600.0 / 900.0)) + white)
+    plain = reading_covariance(times, 0.3, 60.0, 300.0, slow)
+    assert plain[0, 0] == pytest.approx(0.4**2 + white)
