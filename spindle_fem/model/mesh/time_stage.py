@@ -174,8 +174,9 @@ class StageSolver:
         defect = error_defect(size, tuple(stage.rate for stage in stages))
         defect[self._n :][self._lumped_capacity == 0.0] = 0.0
         tolerance = ERROR_SOLVE_FRACTION * (self._control.tolerance or 1.0)
+        known = self._recent.combine(defect, self._shift)
         solution = solve_linear(
-            self._kept.matrix, defect, self._kept.preconditioner, error_tolerance=tolerance
+            self._kept.matrix, defect, self._kept.preconditioner, known, error_tolerance=tolerance
         )
         self.linear_iterations += solution.iterations
         return float(np.abs(solution.unknowns).max(initial=0.0))
