@@ -54,14 +54,19 @@ def _row(diagnosis: Diagnosis, fit: Fit, item: Misdescription) -> dict[str, Any]
     predictor = diagnosis.predictor
     value = fit.values[item.coordinate]
     low, high = fit.interval(item.coordinate, float(norm.ppf(0.5 + 0.5 * LEVEL)) * tuned.INTERVAL_WIDENING)
-    largest, channel = 0.0, ""
+    largest, channel, swing, sensor = 0.0, "", 0.0, ""
     for number, recording in enumerate(predictor.recordings):
         column = predictor.column_of(number, item.coordinate)
         if column is not None:
-            moved = np.abs(value * column[:, : recording.temperature_count]).max(axis=0)
+            kelvins = recording.temperature_count
+            moved = np.abs(value * column[:, :kelvins]).max(axis=0)
             if moved.max() > largest:
                 largest = float(moved.max())
                 channel = recording.temperature_names[int(np.argmax(moved))]
+            # The zero of a displacement is free.
+            for name, own in zip(recording.temperature_names[kelvins:], column.T[kelvins:], strict=True):
+                if abs(value) * np.ptp(own) > swing:
+                    swing, sensor = float(abs(value) * np.ptp(own)), name
     several = item.recording is not None and len(predictor.recordings) > 1
     return {
         "name": item.name,
@@ -74,7 +79,8 @@ def _row(diagnosis: Diagnosis, fit: Fit, item: Misdescription) -> dict[str, Any]
         "high": high,
         "sigmas": value / item.sigma,
         "largest_K": largest,
-        "channel": channel,
+        "channel": channel or sensor,
+        **({"largest_um": swing} if sensor else {}),
         **({"recording": predictor.recordings[item.recording].name} if several else {}),
     }
 

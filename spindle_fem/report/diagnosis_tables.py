@@ -87,7 +87,7 @@ def misdescription_blocks(content: Mapping[str, Any]) -> list[Table | Text]:
                 rounded("high", "high"),
                 words("unit", "unit"),
                 fixed("in widths of its prior", "sigmas", 1),
-                fixed("moves a channel by up to / K", "largest_K", 2),
+                words("moves a channel by up to", _largest),
                 words("channel", "channel"),
             )
             blocks.append(table_of(fields, told[key], caption))
@@ -272,6 +272,13 @@ def next_blocks(content: Mapping[str, Any]) -> list[Any]:
         for failed in item.get("not_simulated", [])
     ]
     return blocks
+
+
+def _largest(row: Mapping[str, Any]) -> str:
+    """What a direction does to temperatures, or, where it leaves them alone, to displacements."""
+    if row["largest_K"] or "largest_um" not in row:
+        return f"{row['largest_K']:.2f} K"
+    return f"{row['largest_um']:.2f} µm"
 
 
 def _in_its_unit(option: Mapping[str, Any], key: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -24,6 +25,8 @@ from spindle_fem.inference.findings import (
 from spindle_fem.inference.growth_misdescriptions import growth_misdescriptions
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.misdescription_columns import with_misdescriptions
+from spindle_fem.inference.misdescription_content import misdescription_content
 from spindle_fem.inference.next_measurement import EXISTING, next_measurement, reading_covariance
 from spindle_fem.inference.opened_machine import DiagnosedMachine, with_growth
 from spindle_fem.inference.predictor import Predictor
@@ -43,7 +46,7 @@ from spindle_fem.recordings.compare import write_simulated
 from spindle_fem.recordings.conditions import operating_conditions
 from spindle_fem.recordings.displaced_readings import with_displacements
 from spindle_fem.report.diagnosis_data import diagnosis_dataset
-from spindle_fem.report.diagnosis_tables import channel_table, next_blocks
+from spindle_fem.report.diagnosis_tables import channel_table, misdescription_blocks, next_blocks
 from spindle_fem.report.read_against_predicted import displaced_before_after
 from tests.support.nose_spindle import RUN, nose_machine, nose_recording
 
@@ -230,6 +233,22 @@ def test_other_expansion_coefficients_move_displacements_alone(heated):
     assert not moved[:, :2].any()
     np.testing.assert_array_equal(moved[:, 2], told[:, 2])
     assert np.ptp(moved[:, 2]) > 10.0
+
+
+def test_an_expansion_that_is_off_is_told_in_micrometres(heated):
+    predictor = Predictor(heated[0].fast, with_growth(heated[0]).recordings)
+    predictor = with_misdescriptions(predictor, tuple(growth_misdescriptions(predictor)))
+    slow = expected_slow_error(predictor)
+    fit = Problem(predictor, known_before(predictor), slow, predictor.observations).fit()
+    judgement = SimpleNamespace(verdict="consistent")
+    made = SimpleNamespace(predictor=predictor, final=fit, null=fit, judgement=judgement)
+    content = misdescription_content(made)
+    (row,) = content["left_open"]
+    assert (row["name"], row["channel"], row["largest_K"]) == ("expansion", "S1", 0.0)
+    # Most of the growth is 3 µm/K of the shaft less 1.2 µm/K of the housing.
+    assert 1.0 < row["largest_um"] < 50.0
+    whole = {"verdict": "consistent", "findings": [], "misdescription": content}
+    assert "µm" in str(misdescription_blocks(whole)[0].rows)
 
 
 def test_predictions_are_written_in_the_units_of_their_channels(heated, tmp_path):
