@@ -106,6 +106,7 @@ def check_machine(
     from spindle_fem.definition.network_load import is_network_machine
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
+    from spindle_fem.operation.driven_flow import flow_warnings
     from spindle_fem.operation.operating_limits import lost_to_air
 
     if picture is not None and picture.suffix != ".png":
@@ -155,7 +156,7 @@ def check_machine(
             {"name": item.where, "detail": item.rule} for item in examine_machine(machine, overrides).assumed
         ],
         "warnings": [
-            *({"code": item.code, "text": item.text} for item in lost_to_air(spec)),
+            *({"code": item.code, "text": item.text} for item in (*flow_warnings(spec), *lost_to_air(spec))),
             *({"code": "geometry_note", "text": note} for note in assembly.notes),
         ],
     }

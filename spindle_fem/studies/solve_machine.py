@@ -15,9 +15,9 @@ from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
 from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.circuits import stream_answer
+from spindle_fem.operation.driven_flow import channel_warnings
 from spindle_fem.operation.operating_limits import lost_to_air
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.physics.coolant.pump import PUMP_PRESSURE
 from spindle_fem.results.thermal_result import (
     BearingResult,
     CircuitResult,
@@ -144,11 +144,9 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     circuits = _circuits(machine, point, coupled)
     if circuits:
         done.append(checks.check_circuits(circuit_mismatch(machine, solution, coupled.loads)))
-    warnings += [
-        *lost_to_air(spec),
-        *_pump_pressure(spec, coolant),
-        *_omitted_preload(spec, point, coupled, around),
-    ]
+    if coolant is not None:
+        warnings += channel_warnings(spec, coolant.flow, coolant.pressure_drop)
+    warnings += [*lost_to_air(spec), *_omitted_preload(spec, point, coupled, around)]
     for lubricant in _lubricants(spec, bearings):
         done.append(lubricant)
         if not lubricant.passed:
@@ -242,28 +240,6 @@ def _omitted_preload(
         f"{factors[name] * states[name].heat.total:.0f} W instead of {cold[name].total:.0f} W. {hint}"
     )
     return [CodedWarning("thermal_preload_omitted", text)]
-
-
-def _pump_pressure(spec: MachineSpec, coolant: CoolantResult | None) -> list[CodedWarning]:
-    """A flow that the machine's pump does not give, or that of no cooler drives through this channel."""
-    if coolant is None:
-        return []
-    if spec.has_pump_limit:
-        if coolant.flow >= coolant.asked_flow:
-            return []
-        text = (
-            f"The pump drives {6e4 * coolant.flow:.3g} L/min instead of {6e4 * coolant.asked_flow:.3g}: the "
-            f"channel takes {1e-5 * coolant.pressure_drop:.3g} bar, all that is given at that flow."
-        )
-        return [CodedWarning("coolant_flow_limited", text)]
-    if coolant.pressure_drop <= PUMP_PRESSURE:
-        return []
-    text = (
-        f"The channel takes {1e-5 * coolant.pressure_drop:.0f} bar at {6e4 * coolant.flow:.3g} L/min; pumps "
-        f"of coolers give up to {1e-5 * PUMP_PRESSURE:.0f} bar, so less will flow: coolant.pressure_limit or "
-        "coolant.pump_curve says how much."
-    )
-    return [CodedWarning("coolant_pressure", text)]
 
 
 def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledState) -> CoolantResult | None:

@@ -13,12 +13,13 @@ from spindle_fem.definition.load import examine, find_machine, load_machine, rea
 from spindle_fem.errors import FaultsError
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
+from spindle_fem.operation.driven_flow import channel_warnings
 from spindle_fem.operation.operating_limits import lost_to_air
 from spindle_fem.report import run_report
 from spindle_fem.studies.heat_study import RPM, usual_speeds
-from spindle_fem.studies.solve_machine import _pump_pressure
 from spindle_fem.units import Uncertain
 from spindle_fem.validity import CHANGES_RESULT, CodedWarning, by_consequence
+from tests.support import page_machine
 
 PAGE = find_machine("motor_spindle")
 
@@ -144,10 +145,27 @@ def test_a_load_that_was_left_out_stands_above_the_checks() -> None:
 
 def test_a_flow_that_no_pump_drives_is_warned_of() -> None:
     spec = SimpleNamespace(has_pump_limit=False)
-    assert not _pump_pressure(spec, SimpleNamespace(pressure_drop=4e5, flow=1e-3))
-    (warning,) = _pump_pressure(spec, SimpleNamespace(pressure_drop=23e5, flow=1e-3))
+    assert not channel_warnings(spec, 1e-3, 4e5)
+    (warning,) = channel_warnings(spec, 1e-3, 23e5)
     assert "23 bar at 60 L/min" in warning.text
     assert by_consequence([CodedWarning("race_control_doubtful", ""), warning])[0] is warning
+
+
+def test_check_says_what_no_pump_drives_before_anything_is_solved(tmp_path) -> None:
+    def told(machine, *overrides) -> list[str]:
+        return [item["text"] for item in check_machine(machine, overrides=overrides)["warnings"]]
+
+    assert told("router_spindle") == []
+    (text,) = told("router_spindle", "coolant.flow=60L/min")
+    assert text.startswith("The channel takes 28 bar at 60 L/min")
+    (text,) = told("router_spindle", "coolant.flow=60L/min", "coolant.pressure_limit=5bar")
+    assert text.startswith("The pump drives 2")
+    # A jacket of half a millimetre.
+    narrow = tmp_path / "narrow.toml"
+    text = page_machine.PAGE.replace('"182 mm"', '"177 mm"').replace("12 L/min", "300 L/min")
+    narrow.write_text(text, encoding="utf-8")
+    (text,) = told(narrow)
+    assert text.startswith("Circuit jacket takes")
 
 
 def _first_notice(warnings) -> str:
