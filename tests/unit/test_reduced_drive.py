@@ -55,6 +55,18 @@ def test_operating_points_that_hardly_differ_share_a_class_and_standstill_is_one
     assert drive.points[drive.step_class[2]].speed == pytest.approx(314.0 + 0.005 / 3, abs=1e-6)
 
 
+def test_readings_have_the_class_of_their_moment_where_that_is_asked():
+    times = np.array([0.0, 100.0, 200.0])
+    values = inputs(times, [100.0, 200.0, 200.0], inlet=[288.0, 289.0, 290.0])
+    drive = make_drive(times, STANDARD, values, HELD, largest_step=100.0)
+    read = [drive.points[number] for number in drive.read_class]
+    # speed as it is just after, the inlet as it is then and not in the middle of a step
+    assert [point.speed for point in read] == [100.0, 200.0, 200.0]
+    assert [point.coolant_inlet_temperature for point in read] == [288.0, 289.0, 290.0]
+    assert [drive.points[n].coolant_inlet_temperature for n in drive.step_class] == [288.5, 289.5]
+    assert make_drive(times, STANDARD, values, HELD, widths=FITTED).read_class is None
+
+
 def test_a_noisy_speed_makes_no_more_classes_than_allowed():
     rng = np.random.default_rng(0)
     times = np.arange(3000) * 1.0
@@ -98,12 +110,14 @@ def test_classes_are_divided_by_the_temperature_of_the_wall():
     drive = make_drive(times, STANDARD, inputs(times, np.where(times < 600.0, 100.0, 200.0)), HELD)
     walls = 290.0 + np.outer(drive.grid / 400.0, [0.9, 1.1])
     found = with_walls(drive, walls)
-    middle = 0.5 * (walls[:-1] + walls[1:])
+    # in the middle of steps, and where readings are
+    wall = np.vstack((0.5 * (walls[:-1] + walls[1:]), walls))
+    owner, divided = (np.append(item.step_class, item.read_class) for item in (drive, found))
     assert len(found.points) > len(drive.points) == 2
     for number, point in enumerate(found.points):
-        rows = found.step_class == number
-        assert len(set(drive.step_class[rows])) == 1
-        assert point.speed == drive.points[drive.step_class[rows][0]].speed
-        assert point.channel_wall == pytest.approx(middle[rows].mean(axis=0))
-        assert np.ptp(middle[rows].mean(axis=1)) <= WALL_BIN
+        rows = divided == number
+        assert len(set(owner[rows])) == 1
+        assert point.speed == drive.points[owner[rows][0]].speed
+        assert point.channel_wall == pytest.approx(wall[rows].mean(axis=0))
+        assert np.ptp(wall[rows].mean(axis=1)) <= WALL_BIN
     assert len(with_walls(drive, np.full_like(walls, 300.0)).points) == 2

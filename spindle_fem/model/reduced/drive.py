@@ -40,16 +40,20 @@ class ClassWidths:
         turns turbulent by 3 %.
     most : int
         Classes; widths grow where inputs take more values.
+    reads : bool
+        Whether outlets of streams are read with the films of the moment; those of the step that begins there
+        otherwise.
     """
 
     inlet: float
     flow: float
     speed: float
     most: int
+    reads: bool = False
 
 
 # Readings within a millikelvin of those with a film for each step.
-PREDICTED = ClassWidths(0.01, 3.0e-4, 1.0e-4, 400)
+PREDICTED = ClassWidths(0.01, 3.0e-4, 1.0e-4, 400, reads=True)
 # For fits, which march many times: some 0.1 mK, up to 25 mK for minutes where the coolant turns turbulent.
 FITTED = ClassWidths(0.25, 0.01, 2.0e-3, 120)
 
@@ -91,6 +95,8 @@ class Drive:
         Mean operating point of each class.
     restarts : tuple of int
         Points of the grid at which a network starts again, after a long gap.
+    read_class : (G + 1,) int ndarray or None
+        Class of the readings at every point of the grid; None for that of the step that begins there.
     """
 
     times: Array
@@ -102,6 +108,7 @@ class Drive:
     points: tuple[OperatingPoint, ...]
     notes: tuple[str, ...]
     restarts: tuple[int, ...] = ()
+    read_class: NDArray[np.int64] | None = None
 
     @property
     def steps(self) -> Array:
@@ -197,8 +204,13 @@ def make_drive(
         raise RecordingError("inputs", f"named {names}.", f"Allowed: {STANDARD} first.")
     grid, start, end = inputs_on_steps(np.asarray(times, dtype=float), values, held, largest_step)
     level_covariates(names, start, end)
-    step_class, points = classes_of(0.5 * (start + end), widths)
-    return Drive(np.asarray(times, dtype=float), grid, names, start, end, step_class, points, notes)
+    inputs = 0.5 * (start + end)
+    if widths.reads:
+        inputs = np.vstack((inputs, start, end[-1:]))
+    found, points = classes_of(inputs, widths)
+    step_class, read_class = np.split(found, [len(start)])
+    drive = Drive(np.asarray(times, dtype=float), grid, names, start, end, step_class, points, notes)
+    return replace(drive, read_class=read_class) if widths.reads else drive
 
 
 def inputs_on_steps(
@@ -294,10 +306,13 @@ def with_walls(drive: Drive, walls: Array) -> Drive:
     walls : (G + 1, n_cells) ndarray, [K]
         At the ends of the steps.
     """
-    middle = 0.5 * (walls[:-1] + walls[1:])
-    mean, width = middle.mean(axis=1), WALL_BIN
+    owners, steps = drive.step_class, len(drive.step_class)
+    wall = 0.5 * (walls[:-1] + walls[1:])
+    if drive.read_class is not None:
+        owners, wall = np.append(owners, drive.read_class), np.vstack((wall, walls))
+    mean, width = wall.mean(axis=1), WALL_BIN
     while True:
-        keys = np.column_stack((drive.step_class, np.round(mean / width)))
+        keys = np.column_stack((owners, np.round(mean / width)))
         first, label = np.unique(keys, axis=0, return_inverse=True)
         if len(first) <= len(drive.points) + MOST_WALLS:
             break
@@ -307,8 +322,9 @@ def with_walls(drive: Drive, walls: Array) -> Drive:
     for number, (owner, _) in enumerate(first):
         point = drive.points[int(owner)]
         own = {name: getattr(point, name) for name in OperatingPoint.__slots__}
-        points.append(WarmedPoint(**own, channel_wall=middle[label == number].mean(axis=0)))
-    return replace(drive, step_class=label, points=tuple(points))
+        points.append(WarmedPoint(**own, channel_wall=wall[label == number].mean(axis=0)))
+    reads = None if drive.read_class is None else label[steps:]
+    return replace(drive, step_class=label[:steps], points=tuple(points), read_class=reads)
 
 
 def inputs_at(drive: Drive, times: Array) -> Mapping[str, Array]:

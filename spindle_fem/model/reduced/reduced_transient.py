@@ -340,7 +340,7 @@ class TransientRun:
 
     # ----------------------------------------------------------------- outputs
     def _outputs(self, states: Array, sensitivities: Array | None, tracks: Tracks | None) -> FastTransient:
-        """Outputs at the output times; the class is that of the step that begins there."""
+        """Outputs at the output times, by the drive's classes of readings."""
         fast, drive = self.fast, self.drive
         n_out, n_par = len(fast.channels), len(self.derivatives)
         at_grid = np.empty((len(states), n_out))
@@ -349,6 +349,8 @@ class TransientRun:
         spins = fast.model.probe_spins
         speed = drive.names.index("speed") if spins.any() else None
         owner = np.append(self.step_class, self.step_class[last])
+        if drive.read_class is not None:
+            owner = self.built.owner[drive.read_class]
         inputs = np.vstack((self.start, self.end[last:]))
         added = np.zeros((len(states), 0)) if tracks is None else tracks.added()
         shift_by = self._shift_inlet(inputs, tracks)

@@ -38,8 +38,9 @@ Array = NDArray[np.float64]
 TOLERANCE, OF_FRICTION, OF_SCALED = 5e-5, 10.0, 2.0
 # Points of the coolant's table.
 MOST_POINTS = 5000
-# Mean rises of the channel's wall above the inlet, K: where films are worked out, and points of the table.
-RISES, RISE_AXIS = np.linspace(-15.0, 30.0, 10), np.linspace(-15.0, 30.0, 46)
+# Mean rises of the channel's wall above the inlet, K: where films are worked out, everywhere and about the usual
+# one, where a flow that turns turbulent bends within a kelvin; and points of the table.
+RISES, NEAR_USUAL, RISE_AXIS = np.linspace(-15.0, 30.0, 10), np.arange(-6.0, 7.0), np.linspace(-15.0, 30.0, 46)
 # The wall changes the film only a little: fewer flows and directions suffice.
 WALL_TOLERANCE, WALL_LEFT_OUT = 2e-3, 3e-6
 # Least mean of a wall's rise, as a share of its largest, by which it can be scaled.
@@ -86,6 +87,11 @@ class WallRise:
         even = abs(mean) <= LEAST_MEAN * np.abs(rise).max()
         profile = np.ones(rise.size) if even else rise / mean
         return cls(profile, mean, fast.model.cell_load.sum(axis=0) / area.sum())
+
+    def means(self) -> Array:
+        """Mean rises at which films are worked out, K."""
+        near = self.usual + NEAR_USUAL
+        return np.union1d(RISES, near[(near > RISES[0]) & (near < RISES[-1])])
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,11 +304,13 @@ def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> Feedb
         rise, *driven = place
         return (coolant.sample(*driven, rise) - at_usual[tuple(driven)]) / scale
 
-    basis, weights = directions_of(change, list(product(RISES, *axes)), WALL_LEFT_OUT)
+    rises = wall.means()
+    basis, weights = directions_of(change, list(product(rises, *axes)), WALL_LEFT_OUT)
     if not len(basis):
         return None
-    coarse = weights.reshape(RISES.size, *(axis.size for axis in axes), -1)
-    values = PchipInterpolator(RISES, coarse)(RISE_AXIS)
+    coarse = weights.reshape(rises.size, *(axis.size for axis in axes), -1)
+    rise_axis = np.union1d(RISE_AXIS, rises)
+    values = PchipInterpolator(rises, coarse)(rise_axis)
     parts = operator_parts(fast, basis * scale)
     loads = [fast.load_names.index(name) for name in ("coolant_inlet", "coolant_friction")]
     size = fast.model.size
@@ -333,7 +341,7 @@ def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> Feedb
         wall.sense,
         {"coolant_inlet": -1.0},
         coolant.table_inputs,
-        (RISE_AXIS, *axes),
+        (rise_axis, *axes),
         values,
         np.array(column),
         np.array(out),

@@ -20,6 +20,7 @@ from spindle_fem.studies.export.functional_mockup import write_functional_mockup
 from spindle_fem.studies.export.portable_model import (
     CLOSE,
     GAMMA,
+    HELD_WITHIN,
     MOST_ROUNDS,
     SLOPE_STEP,
     STAGE_WEIGHT,
@@ -129,12 +130,17 @@ def _c_content(space: StateSpace) -> dict[str, Any]:
         kept[f"input_{end}"] = np.array([none if i[end] is None else i[end] for i in header["inputs"]])
     load_input = kept.pop("load_input").astype(int)
     tables = _c_tables(header, kept)
-    feedback = {"feedbacks": 0, "followed": len(header["feedback_tables"])}
+    feedback = {"feedbacks": 0, "followed": len(header["feedback_tables"]), "held": header["held_tables"]}
     if feedback["followed"]:
+        held = np.isin(header["feedback_tables"], header["held_tables"]).astype(int)
+        own = _table_of(tables, space.arrays["feedback.column"])
         feedback |= {
+            "table_is_held": held,
+            "heat_is_held": held[own],
+            "held_within": HELD_WITHIN,
             "feedbacks": len(kept["feedback.column"]),
             "feedback_column": kept.pop("feedback.column").astype(int),
-            "feedback_table": _table_of(tables, space.arrays["feedback.column"]),
+            "feedback_table": own,
             "slope_step": SLOPE_STEP,
             "close": CLOSE,
             "most_rounds": MOST_ROUNDS,

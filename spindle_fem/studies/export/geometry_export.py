@@ -179,6 +179,8 @@ def _state_space(
     for number, table in enumerate(followed):
         numbers = [len(inputs) + number, *(position[item] for item in table.inputs)]
         add_table(f"follows{number}", "feedback_tables", table.axes, numbers, table.values)
+    if of_wall is not None:
+        header["held_tables"].append(header["feedback_tables"][-1])
     if followed:
         arrays |= _feedback_arrays(followed, modes, list(loads), len(fast.channels))
         for sensor, line in effects.sensors:

@@ -13,7 +13,8 @@ time. With ``scheme = "TR-BDF2"`` ``K``, ``B``, ``C`` and ``D`` follow the input
 with ``a_i`` from tables, and steps are of second order and L-stable. Friction, ball rows and
 films that follow temperatures add heats ``a(s, inputs) (in x + drive w)`` with ``s`` a temperature of the
 machine, some of which are read with the outputs; their values at the end of a step are found by Newton's
-method. Temperatures are in °C, all else in the units that the model names.
+method. Those of ``held_tables`` keep the ``a`` of the middle of a step all through it, as ``K`` does.
+Temperatures are in °C, all else in the units that the model names.
 """
 
 from __future__ import annotations
@@ -25,12 +26,15 @@ from pathlib import Path
 
 import numpy as np
 
-SCHEMA = "spindle-fem/state-space/1"
+SCHEMA = "spindle-fem/state-space/2"
 # TR-BDF2, Bank et al. (1985), IEEE Trans. CAD 4, 436-451.
 GAMMA = 2.0 - math.sqrt(2.0)
 STAGE_WEIGHT, START_WEIGHT = 0.5 + 1.0 / math.sqrt(2.0), 1.0 / math.sqrt(2.0) - 0.5
 # Slopes of tables [K]; last change of Newton's method, as a share of the largest of the state.
 SLOPE_STEP, CLOSE, MOST_ROUNDS = 1e-3, 1e-9, 30
+# Temperatures that held tables follow may move this far before matrices are made anew, K: films follow them by
+# some 1 % a kelvin, which leaves micro- to tens of microkelvin.
+HELD_WITHIN = 1e-3
 
 
 class PortableModel:
@@ -61,6 +65,8 @@ class PortableModel:
         self._default = np.array([item["default"] for item in header["inputs"]], dtype=float)
         self._unsigned = np.array([item["magnitude"] for item in header["inputs"]], dtype=bool)
         self._solver = None
+        if header["feedback_tables"]:
+            self._prepare_feedback()
         self.state = self.arrays["uniform"] * header["initial_degC"]
 
     @classmethod
@@ -145,23 +151,35 @@ class PortableModel:
                 found[number] = found[number] + np.tensordot(weights, kept[f"{name}.{part}"], axes=1)
         return found
 
+    def _prepare_feedback(self):
+        """Table of every heat that follows a temperature, and whether its factor is held over a step."""
+        names, kept = self.header["feedback_tables"], self.arrays
+        self._column = kept["feedback.column"].astype(int)
+        ends = np.cumsum([kept[f"{name}.values"].shape[-1] for name in names])
+        self._table = np.searchsorted(ends, self._column, side="right")
+        self._held_tables = np.isin(names, self.header["held_tables"])
+        self._held = self._held_tables[self._table]
+
+    def _sensed(self, loads, state):
+        """Temperatures that feedback tables follow, (t,); none where there are none."""
+        if not self.header["feedback_tables"]:
+            return np.zeros(0)
+        return self.arrays["feedback.sense"] @ state + self.arrays["feedback.sense_load"] @ loads
+
+    def _factors(self, values, sensed):
+        """Factors of the heats that follow temperatures, (d,)."""
+        known = np.concatenate((values, sensed))
+        names = self.header["feedback_tables"]
+        return np.concatenate([self._lookup(name, known) for name in names])[self._column]
+
     def _feedback(self, values, loads, state):
         """Heats that follow temperatures (d,) [W], and their derivatives to the state (d, r)."""
-        kept = self.arrays
-        sensed = kept["feedback.sense"] @ state + kept["feedback.sense_load"] @ loads
-        known = np.concatenate((values, sensed))
+        kept, sensed = self.arrays, self._sensed(loads, state)
         flux = kept["feedback.into"] @ state + kept["feedback.load"] @ loads
-        factors, slopes = [], []
-        for number, name in enumerate(self.header["feedback_tables"]):
-            value = self._lookup(name, known)
-            moved = known.copy()
-            moved[len(values) + number] += SLOPE_STEP
-            slope = (self._lookup(name, moved) - value) / SLOPE_STEP
-            factors.append(value)
-            slopes.append(slope[:, None] * kept["feedback.sense"][number])
-        column = kept["feedback.column"].astype(int)
-        factor, slope = np.concatenate(factors)[column], np.concatenate(slopes)[column]
-        return factor * flux, factor[:, None] * kept["feedback.into"] + flux[:, None] * slope
+        factor = self._factors(values, sensed)
+        slope = flux * (self._factors(values, sensed + SLOPE_STEP) - factor) / SLOPE_STEP
+        by_state = factor[:, None] * kept["feedback.into"] + slope[:, None] * kept["feedback.sense"][self._table]
+        return factor * flux, by_state
 
     # -------------------------------------------------------------------- states
     def start(self, temperature, inputs=None):
@@ -249,37 +267,62 @@ class PortableModel:
         self.state = np.exp(-decay) * self.state + step * (mean * start + ramp * (end - start))
 
     def _tr_bdf2(self, step, first, last):
-        """Two implicit stages with the matrices of the step's mean inputs."""
-        key = (round(step, 6), *(0.5 * (first + last)))
-        if self._solver is None or self._solver[0] != key:
-            conduction, load, _, _ = self.matrices(0.5 * (first + last))
-            weight = 0.5 * GAMMA * step
-            inverse = np.linalg.inv(np.eye(len(conduction)) + weight * conduction)
-            self._solver = key, conduction, load, inverse
-        _, conduction, load, inverse = self._solver
+        """A step with the matrices of its middle, which is found where some follow temperatures."""
+        before, middle = self.state, 0.5 * (first + last)
+        loads = self.loads(first), self.loads(last)
+        begin = end = self._sensed(loads[0], before)
+        for _ in range(MOST_ROUNDS):
+            self._factorise(step, middle, 0.5 * (begin + end))
+            self.state = self._stages(step, (first, last), loads, before)
+            guess, end = end, self._sensed(loads[1], self.state)
+            if self._follows_within(0.5 * (end - guess)):
+                return
+        raise ArithmeticError("films and their walls find no common state; take shorter steps.")
+
+    def _follows_within(self, moved):
+        """Whether temperatures that held tables follow moved too little to matter."""
+        return not moved.size or np.abs(moved[self._held_tables]).max(initial=0.0) <= HELD_WITHIN
+
+    def _factorise(self, step, middle, sensed):
+        """Matrices at the middle of a step and the inverse of 1 + step d K, kept while these stay."""
+        key = (round(step, 6), *middle)
+        if self._solver is not None and self._solver[0] == key and self._follows_within(sensed - self._solver[1]):
+            return
+        conduction, load, _, _ = self.matrices(middle)
+        if sensed.size and self._held.any():
+            kept, held = self.arrays, self._held
+            warmed = (self._factors(middle, sensed)[held, None] * kept["feedback.out"][held]).T
+            conduction = conduction - warmed @ kept["feedback.into"][held]
+            load = load + warmed @ kept["feedback.load"][held]
+        inverse = np.linalg.inv(np.eye(len(conduction)) + 0.5 * GAMMA * step * conduction)
+        self._solver = key, sensed, conduction, load, inverse
+
+    def _stages(self, step, inputs, loads, before):
+        """State after two implicit stages, with the heats at their end that follow temperatures there."""
+        *_, conduction, load, inverse = self._solver
         weight = 0.5 * GAMMA * step
-        before, followed = self.state, self.header["feedback_tables"]
-        first_loads, last_loads = self.loads(first), self.loads(last)
-        start, end = load @ first_loads, load @ last_loads
+        start, end = (load @ own for own in loads)
+        followed = self.header["feedback_tables"] and not self._held.all()
         if followed:
-            out = self.arrays["feedback.out"]
-            heat, slope = self._feedback(first, first_loads, before)
+            free = ~self._held
+            out = self.arrays["feedback.out"][free]
+            heat = self._feedback(inputs[0], loads[0], before)[0][free]
             start = start + out.T @ heat
         right = before - weight * (conduction @ before) + weight * ((2.0 - GAMMA) * start + GAMMA * end)
         stage = inverse @ right
         state = inverse @ (STAGE_WEIGHT * stage - START_WEIGHT * before + weight * end)
-        if followed:
-            # Response of the state to heats at the step's end.
-            warmed = weight * (inverse @ out.T)
-            answer = warmed + GAMMA * STAGE_WEIGHT * (inverse @ warmed)
-            base, state = state, state + answer @ heat
-            for _ in range(MOST_ROUNDS):
-                found, slope = self._feedback(last, last_loads, state)
-                change = np.linalg.solve(np.eye(len(heat)) - slope @ answer, found - heat)
-                heat = heat + change
-                state = base + answer @ heat
-                if np.abs(answer @ change).max() < CLOSE * np.abs(state).max():
-                    break
-            else:
-                raise ArithmeticError("friction and films find no common state; take shorter steps.")
-        self.state = state
+        if not followed:
+            return state
+        # Response of the state to heats at the step's end.
+        warmed = weight * (inverse @ out.T)
+        answer = warmed + GAMMA * STAGE_WEIGHT * (inverse @ warmed)
+        base, state = state, state + answer @ heat
+        for _ in range(MOST_ROUNDS):
+            found, slope = self._feedback(inputs[1], loads[1], state)
+            found, slope = found[free], slope[free]
+            change = np.linalg.solve(np.eye(len(heat)) - slope @ answer, found - heat)
+            heat = heat + change
+            state = base + answer @ heat
+            if np.abs(answer @ change).max() < CLOSE * np.abs(state).max():
+                return state
+        raise ArithmeticError("friction and films find no common state; take shorter steps.")

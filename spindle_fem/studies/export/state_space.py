@@ -136,6 +136,7 @@ def header_of(
         "load_tables": [],
         "operator_tables": [],
         "feedback_tables": [],
+        "held_tables": [],
         "table_inputs": {},
         "notes": [],
     }
