@@ -30,10 +30,12 @@ fi
 }
 "$python" -c 'import ensurepip, venv' 2>/dev/null || install_packages python3-venv
 
+say "Installing spindle_fem and what it needs into $venv; a few minutes the first time ..."
 [ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,cluster,optimise]'
 
 # What a first run would wait for: compiled while the pictures' libraries are checked.
+say "Compiling the kernels of the finite elements ..."
 "$venv/bin/python" -m spindle_fem.model.mesh.kernels.compile &
 compiling=$!
 
@@ -51,3 +53,4 @@ if ! works; then
 fi
 
 wait "$compiling"
+say "Ready: $venv/bin/spindle-fem, or after  source $venv/bin/activate  spindle-fem alone."

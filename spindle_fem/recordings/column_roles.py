@@ -86,6 +86,8 @@ def _guess(
     if not warm:
         why = "drives nothing that is known by this name and unit" if unit else "neither name nor unit tells"
         doubt = _doubt_of_input(drives, unit, inputs) if drives not in taken else ""
+        if not unit and not doubt:
+            doubt = "no unit is stated, and neither name nor size tells what it is: it drives nothing"
         return GuessedChannel(Channel(column=name, role="covariate", unit=unit or None), why, doubt)
     unit = unit or _temperature_unit(present)
     if len(machine.outlets) == 1 and machine.outlets[0] not in taken and says(name, OUTLET_WORDS):

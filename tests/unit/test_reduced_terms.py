@@ -143,7 +143,7 @@ def test_operating_points_that_hardly_differ_have_the_same_operators(fast, steps
     names = ("film.outside", "coolant.film_factor")
     exact = TransientRun(fast, drive, {}, names, ())
     merged = TransientRun(fast, drive, {}, names, (), same_within=5e-3)
-    assert len(set(exact.step_class.tolist())) == len(drive.points) > 6
+    assert len(set(exact.step_class.tolist())) == len(set(drive.step_class.tolist())) > 6
     speeds = np.round([point.speed for point in drive.points], 6)
     assert len(set(merged.step_class.tolist())) == len(set(speeds.tolist())) == 2
     assert np.array_equal(speeds[merged.built.owner], speeds)
