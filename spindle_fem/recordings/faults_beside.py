@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -84,8 +84,17 @@ def _names(content: dict[str, Any], names: RecordableNames) -> Iterator[SpindleF
     for name in names.needed:
         if name not in driven:
             yield RecordingError(
-                "channel", f'none drives "{name}", which the machine needs.', did_you_mean(name, driven)
+                "channel", f'none drives "{name}", which the machine needs.', how_to_drive(name, driven)
             )
+
+
+def how_to_drive(name: str, driven: Sequence[str]) -> str:
+    """What to do where no channel drives an input, and what is driven instead.
+
+    >>> how_to_drive("speed", ["sped"])
+    'Give its channel role = "input" and drives = "speed"; driven: sped.'
+    """
+    return f'Give its channel role = "input" and drives = "{name}"; driven: {", ".join(driven) or "nothing"}.'
 
 
 def _channels(content: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:

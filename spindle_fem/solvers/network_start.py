@@ -18,6 +18,7 @@ from spindle_fem.errors import (
 from spindle_fem.model.lumped.driven_inputs import boundary_temperatures, source_heat
 from spindle_fem.model.lumped.thermal_network import Parameter, ThermalNetwork
 from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.faults_beside import how_to_drive
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.network_steady import solve_steady
 from spindle_fem.units import ANGULAR_SPEED_UNIT, registry
@@ -54,7 +55,7 @@ def require_compatible(network: ThermalNetwork, recording: Recording) -> tuple[s
                 RecordingError(
                     where,
                     f'no channel drives "{name}", which the machine needs.',
-                    did_you_mean(name, recording.input_names),
+                    how_to_drive(name, recording.input_names),
                 )
             )
     units = dict(zip(recording.input_names, recording.input_units, strict=True))

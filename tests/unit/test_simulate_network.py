@@ -326,7 +326,8 @@ def test_every_misfit_of_machine_and_recording_at_once(tmp_path, network):
     text = str(caught.value)
     assert len(caught.value.faults) == 2
     assert 'channel T_bearing: probe "bearng" is not a node of the machine. Did you mean "bearing"' in text
-    assert 'no channel drives "ambient", which the machine needs. Allowed: hall, speed' in text
+    assert 'no channel drives "ambient", which the machine needs. Give its channel' in text
+    assert 'drives = "ambient"; driven: hall, speed.' in text
 
 
 @pytest.mark.parametrize(
