@@ -17,6 +17,7 @@ from spindle_fem.report.figure_style import (
     BODY_NAMES,
     CYCLE,
     INK,
+    MUTED,
     TEMPERATURE_LABEL,
     new_figure,
     pixel_axes,
@@ -120,7 +121,8 @@ def _bands(axes: Axes, flows: Mapping[str, float], body: float, total: float, *,
         axes.add_patch(
             PathPatch(Path(vertices, codes), facecolor=palette[number % 2], alpha=0.72, linewidth=0.0)
         )
-        text = f"{readable(name)}   {value:.1f} W ({100.0 * value / total:.1f} %)"
+        share = 100.0 * value / total
+        text = f"{readable(name)}   {value:.1f} W ({f'{share:.1f}' if share >= 0.05 else '< 0.1'} %)"
         axes.text(
             far + (-14.0 if left else 14.0),
             end,
@@ -260,6 +262,8 @@ def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Fig
     for axes in (left, right):
         axes.margins(x=0.01)
         for turn in range(1, math.floor(turns.max()) + 1):
-            axes.axvline(np.interp(turn, turns, place), color="#cfd6dc", linewidth=0.8, linestyle=":")
+            axes.axvline(
+                np.interp(turn, turns, place), color=MUTED, linewidth=0.9, linestyle=":", zorder=1.5
+            )
     set_title(figure, "Coolant along the helical channel", notes)
     return figure
