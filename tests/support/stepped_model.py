@@ -6,11 +6,12 @@ import subprocess
 import numpy as np
 import pytest
 
-from spindle_fem.commands.export_command import export_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.model.reduced.drive import drive_of_recording
 from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.studies.export.export_machine import machine_state_space
+from spindle_fem.studies.export.exported_files import file_writer
 from spindle_fem.studies.export.portable_model import PortableModel
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -52,8 +53,10 @@ def readings_along(model, drive, given, most_steps=None):
 
 def told_and_found(folder, machine, overrides, recording):
     """Outputs at a recording's rows (N - 1, p): by simulate, by the exported machine in Python, in C."""
+    # one export, in both forms
+    space = machine_state_space(machine, overrides)
     for name in ("model.npz", "model.c"):
-        export_machine(machine, folder / name, overrides)
+        file_writer(folder / name)(space, folder / name)
     spec = load_machine(machine, overrides)
     drive = drive_of_recording(spec, recording)
     start = drive.first("ambient")

@@ -38,9 +38,13 @@ Array = NDArray[np.float64]
 TOLERANCE, OF_FRICTION, OF_SCALED = 5e-5, 10.0, 2.0
 # Points of the coolant's table.
 MOST_POINTS = 5000
-# Mean rises of the channel's wall above the inlet, K: where films are worked out, everywhere and about the usual
-# one, where a flow that turns turbulent bends within a kelvin; and points of the table.
-RISES, NEAR_USUAL, RISE_AXIS = np.linspace(-15.0, 30.0, 10), np.arange(-6.0, 7.0), np.linspace(-15.0, 30.0, 46)
+# Mean rises of the channel's wall above the inlet, K: where films are worked out, everywhere and about the
+# usual one, as a flow that turns turbulent bends within a kelvin; and points of the table.
+RISES, NEAR_USUAL, RISE_AXIS = (
+    np.linspace(-15.0, 30.0, 10),
+    np.arange(-6.0, 7.0),
+    np.linspace(-15.0, 30.0, 46),
+)
 # The wall changes the film only a little: fewer flows and directions suffice.
 WALL_TOLERANCE, WALL_LEFT_OUT = 2e-3, 3e-6
 # Least mean of a wall's rise, as a share of its largest, by which it can be scaled.

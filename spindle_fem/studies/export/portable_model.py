@@ -32,8 +32,8 @@ GAMMA = 2.0 - math.sqrt(2.0)
 STAGE_WEIGHT, START_WEIGHT = 0.5 + 1.0 / math.sqrt(2.0), 1.0 / math.sqrt(2.0) - 0.5
 # Slopes of tables [K]; last change of Newton's method, as a share of the largest of the state.
 SLOPE_STEP, CLOSE, MOST_ROUNDS = 1e-3, 1e-9, 30
-# Temperatures that held tables follow may move this far before matrices are made anew, K: films follow them by
-# some 1 % a kelvin, which leaves micro- to tens of microkelvin.
+# How far temperatures that held tables follow may move before matrices are made anew, K: films follow them
+# by some 1 % a kelvin, which leaves microkelvin to tens of them.
 HELD_WITHIN = 1e-3
 
 
@@ -178,7 +178,9 @@ class PortableModel:
         flux = kept["feedback.into"] @ state + kept["feedback.load"] @ loads
         factor = self._factors(values, sensed)
         slope = flux * (self._factors(values, sensed + SLOPE_STEP) - factor) / SLOPE_STEP
-        by_state = factor[:, None] * kept["feedback.into"] + slope[:, None] * kept["feedback.sense"][self._table]
+        by_state = (
+            factor[:, None] * kept["feedback.into"] + slope[:, None] * kept["feedback.sense"][self._table]
+        )
         return factor * flux, by_state
 
     # -------------------------------------------------------------------- states
@@ -286,7 +288,11 @@ class PortableModel:
     def _factorise(self, step, middle, sensed):
         """Matrices at the middle of a step and the inverse of 1 + step d K, kept while these stay."""
         key = (round(step, 6), *middle)
-        if self._solver is not None and self._solver[0] == key and self._follows_within(sensed - self._solver[1]):
+        if (
+            self._solver is not None
+            and self._solver[0] == key
+            and self._follows_within(sensed - self._solver[1])
+        ):
             return
         conduction, load, _, _ = self.matrices(middle)
         if sensed.size and self._held.any():
