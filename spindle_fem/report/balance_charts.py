@@ -262,6 +262,14 @@ def coolant_along_channel(coolant: CoolantResult, *, ports: bool = False) -> Fig
     for axes in (left, right):
         axes.margins(x=0.01)
         for turn in range(1, math.floor(turns.max()) + 1):
-            axes.axvline(np.interp(turn, turns, place), color=MUTED, linewidth=0.9, linestyle=":", zorder=1.5)
+            # below the legends
+            axes.axvline(
+                np.interp(turn, turns, place),
+                ymax=0.86,
+                color=MUTED,
+                linewidth=0.9,
+                linestyle=":",
+                zorder=1.5,
+            )
     set_title(figure, "Coolant along the helical channel", notes)
     return figure
