@@ -12,7 +12,7 @@ from spindle_fem.model.mesh.linear_solvers import Method
 ERROR_TOLERANCE_K = 0.05
 # However well a stage's iteration contracts, its last change is at most 1/share times what may be left:
 # heat that follows the temperatures is that of the last input.
-LEAST_SHARE = 0.1
+LEAST_SHARE = 0.2
 
 
 @dataclass(frozen=True, slots=True)
