@@ -186,7 +186,10 @@ def sensitivity_forcing(
 
 def group_steps(step_class: NDArray[np.int64], steps: Array) -> Mapping[tuple[int, float], NDArray[np.int64]]:
     """Steps by operating class and length, to a microsecond."""
-    lengths = np.round(steps, 6)
-    keys, label = np.unique(np.column_stack((step_class, lengths)), axis=0, return_inverse=True)
-    label = label.reshape(-1)
-    return {(int(key[0]), float(key[1])): np.flatnonzero(label == i) for i, key in enumerate(keys)}
+    lengths, length = np.unique(np.round(steps, 6), return_inverse=True)
+    # One whole number for both: rows of a table take ten times as long to sort.
+    keys, label = np.unique(step_class * len(lengths) + length, return_inverse=True)
+    return {
+        (int(key) // len(lengths), float(lengths[key % len(lengths)])): np.flatnonzero(label == number)
+        for number, key in enumerate(keys)
+    }
