@@ -18,7 +18,7 @@ from spindle_fem.inference.candidate_response import variants_of
 from spindle_fem.inference.followed_readings import Followed, FollowedReadings
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis import Hypothesis
-from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
@@ -193,6 +193,10 @@ def diagnose_recordings(
     after = next(h.fit for h in refitted if not h.fit.candidates)
     if after.misfit_with_prior < own.misfit_with_prior:
         unchanged, plain, own = predictor, final, after
+    elif _likelier_about(plain, refitted[0].fit):
+        # Columns that mislead nothing missing mislead a set too: those about nothing missing then serve all.
+        predictor, final = unchanged, plain
+        refitted = _refit(final, found, workers, overlapping, FollowedReadings(final, final), coarseness)
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
     readings = FollowedReadings(final, plain, lambda fit: told_states(search, final, fit))
     refitted = with_own_noise(plain, readings.residuals, readings.kept(refitted))
@@ -236,6 +240,15 @@ def diagnose_recordings(
         wrong,
         readings.followed(judgement.chosen.fit),
     )
+
+
+def _likelier_about(problem: Problem, fit: Fit) -> bool:
+    """Whether a set is likelier by what directions do in another problem than in that of its own fit."""
+    try:
+        again = problem.fit(fit.candidates, fit.values)
+    except NOT_SIMULATED:
+        return False
+    return again.misfit_with_prior < fit.misfit_with_prior
 
 
 def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:

@@ -48,7 +48,8 @@ def exchanged(search: Search) -> None:
     may not have passed it. Unrecorded heat in intervals fits almost anything:
     it is tried at other spots, and beside other effects any effect that
     follows a law is tried in its place. Where it follows a recorded quantity it
-    is tried at other spots too.
+    is tried at other spots too. To first order the forms of one law hardly differ: the others are tried in
+    its place.
     """
     tasks: list[Task] = []
     own = {effect.name for effect in search.interval_effects}
@@ -65,6 +66,13 @@ def exchanged(search: Search) -> None:
                         rest,
                         lambda c, member=member: c.effect in own and c.component != member.component,
                     )
+                tasks += _with_laws(
+                    search,
+                    rest,
+                    lambda c, member=member: (
+                        (c.effect, c.component) == (member.effect, member.component) and c.form != member.form
+                    ),
+                )
                 places = _beside(search, member.component)
                 tasks += _with_laws(
                     search,
