@@ -1,0 +1,73 @@
+"""Sets next to the best one, with a search that only notes what it is asked to fit."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.inference.candidate_response import Variant
+from spindle_fem.inference.hypothesis import identity
+from spindle_fem.inference.neighbouring_sets import exchanged
+from spindle_fem.inference.screening import Screened
+
+
+def law(effect: str, component: str, form: str = "") -> Candidate:
+    """A law with one amplitude."""
+    term = Term()
+    term.name = f"{effect}.{component}.{form}"
+    term.parameters = (TermParameter("size", 0.0, 1.0, logarithmic=False),)
+    return Candidate(effect, component, form, "missing_physics", f"{term.name}.size", 0.0, 0.5, terms=(term,))
+
+
+HUMP, RAMP = law("drift", "room", "hump"), law("drift", "room", "ramp")
+BESIDE, ELSEWHERE = law("radiation", "room"), law("radiation", "flange")
+
+
+class NotingSearch:
+    """The best set is one hump of the room; every law explains as much to first order."""
+
+    interval_effects = ()
+    candidates = (HUMP, RAMP, BESIDE, ELSEWHERE)
+    view = SimpleNamespace(kind="machine", groups=(), sets={})
+
+    def __init__(self) -> None:
+        nothing = SimpleNamespace(fit=SimpleNamespace(candidates=(), values={}))
+        self.best = SimpleNamespace(fit=SimpleNamespace(candidates=(HUMP,), values={}))
+        self.found = {identity(()): nothing, identity((HUMP,)): self.best}
+        count = len(self.candidates)
+        screened = Screened(
+            tuple(Variant(item, {}) for item in self.candidates),
+            np.eye(count),
+            np.full(count, 5.0),
+            25.0,
+            np.ones(count),
+            np.zeros(count),
+            np.zeros(count),
+        )
+        self.screenings = {identity(()): screened}
+        self.asked: set = set()
+
+    def ranked(self):
+        """The best set first."""
+        return [self.best]
+
+    def in_intervals(self, candidate):
+        """Laws alone."""
+        return False
+
+    def task(self, fit, additions, intervals):
+        """The set that would be fitted."""
+        return (*fit.candidates, *(variant.candidate for variant, _ in additions)), {}
+
+    def fit_all(self, tasks):
+        """Note what is asked."""
+        self.asked = {identity(candidates) for candidates, _ in tasks}
+
+
+def test_other_forms_and_laws_at_its_place_are_tried_in_the_place_of_a_law():
+    search = NotingSearch()
+    exchanged(search)
+    assert search.asked == {identity((RAMP,)), identity((BESIDE,))}
