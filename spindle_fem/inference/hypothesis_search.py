@@ -21,7 +21,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant, variants_of
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis, identity
-from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.missing_heat import (
     OnOff,
     Onsets,
@@ -261,15 +261,20 @@ class Search:
                 self.remember_cost(variant.candidate, intervals_cost(intervals[id(variant.candidate)]))
         return candidates, start
 
-    def fit_all(self, tasks: Sequence[Task]) -> None:
+    def fit_all(self, tasks: Sequence[Task], again: bool = False) -> None:
         """Fit the sets that are not known yet, some at a time side by side, and keep them.
 
         The same number at a time whatever the number of workers, so that the result is the same.
+
+        Parameters
+        ----------
+        again : bool
+            Whether to fit known sets again that begin with less misfit than they ended with.
         """
         waiting: dict[frozenset, Task] = {}
         for candidates, start in tasks:
             key = identity(candidates)
-            if key not in self.found:
+            if key not in self.found or (again and self._begins_better(candidates, start)):
                 waiting.setdefault(key, (candidates, start))
         queue = list(waiting.values())
         rest = range(FITTED_FIRST, len(queue), FITTED_TOGETHER)
@@ -286,6 +291,14 @@ class Search:
                     continue
                 paid = sum(self._paid.get(identity((c,)), 0.0) for c in candidates)
                 self.keep(self.hypothesis(fitted, paid))
+
+    def _begins_better(self, candidates: Sequence[Candidate], start: Mapping[str, float]) -> bool:
+        """Whether values leave less of a known set than its fit, which ended elsewhere."""
+        try:
+            begun = self.problem.fit(candidates, start, iterations=0)
+        except NOT_SIMULATED:
+            return False
+        return begun.misfit_with_prior < self.found[identity(candidates)].fit.misfit_with_prior
 
     def _unseen(self, candidate: Candidate, values: Mapping[str, float]) -> bool:
         """Whether an event lies where nothing was recorded, neither readings nor inputs."""

@@ -31,13 +31,17 @@ def widened(search: Search) -> None:
 
 
 def reduced(search: Search) -> None:
-    """Leave out what came first: each of the best sets without each of its members."""
+    """Leave out what came first: each of the best sets without each of its members.
+
+    Where a member does nothing, the rest begins better than its own fit may have ended.
+    """
     search.fit_all(
         [
             (tuple(c for c in hypothesis.fit.candidates if c is not left_out), hypothesis.fit.values)
             for hypothesis in [h for h in search.ranked() if len(h.fit.candidates) > 1][: tuned.SETS_REDUCED]
             for left_out in hypothesis.fit.candidates
-        ]
+        ],
+        again=True,
     )
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.inference.candidate_response import Variant
 from spindle_fem.inference.hypothesis import identity
+from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.neighbouring_sets import exchanged
 from spindle_fem.inference.screening import Screened
 
@@ -71,3 +73,29 @@ def test_other_forms_and_laws_at_its_place_are_tried_in_the_place_of_a_law():
     search = NotingSearch()
     exchanged(search)
     assert search.asked == {identity((RAMP,)), identity((BESIDE,))}
+
+
+@pytest.fixture
+def search(monkeypatch):
+    """A search that knows one set, whose fit left 50, and keeps what is fitted as it is given."""
+    monkeypatch.setattr(Search, "_hopeless", lambda self, size: np.inf)
+    monkeypatch.setattr(Search, "_unseen", lambda self, candidate, values: False)
+    monkeypatch.setattr(Search, "hypothesis", lambda self, fit, paid=0.0: fit)
+    monkeypatch.setattr(Search, "keep", lambda self, fit: self.found.update({"kept": fit}))
+    problem = SimpleNamespace(
+        fit=lambda candidates, start, iterations: SimpleNamespace(misfit_with_prior=start["left"])
+    )
+    workers = SimpleNamespace(
+        fits=lambda problem, orders: [SimpleNamespace(values=dict(order.start)) for order in orders]
+    )
+    found = Search(problem, NotingSearch.view, {}, (), (), {}, workers=workers)
+    found.found = {identity((BESIDE,)): SimpleNamespace(fit=SimpleNamespace(misfit_with_prior=50.0))}
+    return found
+
+
+@pytest.mark.parametrize(
+    ("left", "again", "fitted"), [(40.0, True, True), (60.0, True, False), (40.0, False, False)]
+)
+def test_a_known_set_is_fitted_again_where_it_begins_with_less(search, left, again, fitted):
+    search.fit_all([((BESIDE,), {"left": left})], again=again)
+    assert ("kept" in search.found) is fitted
