@@ -242,6 +242,17 @@ def diagnose_recordings(
     )
 
 
+def _begun_with_more(problem: Problem, item: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis:
+    """A set fitted again from where one that holds more ended, if it begins better there.
+
+    Where a further member does nothing, the fit of the rest has ended elsewhere.
+    """
+    for more in fitted:
+        if item.keys < more.keys and problem.begins_better(item.fit, more.fit.values):
+            item = replace(item, fit=problem.fit(item.fit.candidates, more.fit.values))
+    return item
+
+
 def _likelier_about(problem: Problem, fit: Fit) -> bool:
     """Whether a set is likelier by what directions do in another problem than in that of its own fit."""
     try:
@@ -325,6 +336,7 @@ def _refit(
         for fit, item in zip(workers.fits(problem, orders), chosen, strict=True)
         if fit is not None
     ]
+    fitted = [_begun_with_more(problem, h, fitted) for h in fitted]
     return sorted(fitted, key=lambda h: -h.score)
 
 

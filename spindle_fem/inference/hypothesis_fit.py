@@ -211,6 +211,14 @@ class Problem:
             found.append(replace(prediction, sensitivity=prediction.sensitivity * scale))
         return found
 
+    def begins_better(self, fit: Fit, start: Mapping[str, float]) -> bool:
+        """Whether values leave less of a set than its fit, which ended elsewhere."""
+        try:
+            begun = self.fit(fit.candidates, start, iterations=0)
+        except NOT_SIMULATED:
+            return False
+        return begun.misfit_with_prior < fit.misfit_with_prior
+
     def fit(
         self,
         candidates: Sequence[Candidate] = (),

@@ -21,7 +21,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant, variants_of
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis, identity
-from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
+from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.missing_heat import (
     OnOff,
     Onsets,
@@ -274,7 +274,8 @@ class Search:
         waiting: dict[frozenset, Task] = {}
         for candidates, start in tasks:
             key = identity(candidates)
-            if key not in self.found or (again and self._begins_better(candidates, start)):
+            known = self.found.get(key)
+            if known is None or (again and self.problem.begins_better(known.fit, start)):
                 waiting.setdefault(key, (candidates, start))
         queue = list(waiting.values())
         rest = range(FITTED_FIRST, len(queue), FITTED_TOGETHER)
@@ -291,14 +292,6 @@ class Search:
                     continue
                 paid = sum(self._paid.get(identity((c,)), 0.0) for c in candidates)
                 self.keep(self.hypothesis(fitted, paid))
-
-    def _begins_better(self, candidates: Sequence[Candidate], start: Mapping[str, float]) -> bool:
-        """Whether values leave less of a known set than its fit, which ended elsewhere."""
-        try:
-            begun = self.problem.fit(candidates, start, iterations=0)
-        except NOT_SIMULATED:
-            return False
-        return begun.misfit_with_prior < self.found[identity(candidates)].fit.misfit_with_prior
 
     def _unseen(self, candidate: Candidate, values: Mapping[str, float]) -> bool:
         """Whether an event lies where nothing was recorded, neither readings nor inputs."""

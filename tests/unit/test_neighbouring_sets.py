@@ -82,9 +82,7 @@ def search(monkeypatch):
     monkeypatch.setattr(Search, "_unseen", lambda self, candidate, values: False)
     monkeypatch.setattr(Search, "hypothesis", lambda self, fit, paid=0.0: fit)
     monkeypatch.setattr(Search, "keep", lambda self, fit: self.found.update({"kept": fit}))
-    problem = SimpleNamespace(
-        fit=lambda candidates, start, iterations: SimpleNamespace(misfit_with_prior=start["left"])
-    )
+    problem = SimpleNamespace(begins_better=lambda fit, start: start["left"] < fit.misfit_with_prior)
     workers = SimpleNamespace(
         fits=lambda problem, orders: [SimpleNamespace(values=dict(order.start)) for order in orders]
     )
