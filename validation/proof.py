@@ -2,7 +2,8 @@
 
 Every ``STUDY`` is a folder of one of the generators with ``answers`` and ``results``. Writes ``proof.json``
 (the rows of every case, the figures that follow from them, a worked case, real recordings), pictures, and
-``README.md``, which is rendered from ``proof.json`` alone, so that every number on it is stored there.
+``README.md``, which is rendered from ``proof.json`` alone, so that every number on it is stored there. Real
+recordings, riddles and other programs that are not given again stay as they stand there.
 """
 
 import argparse
@@ -262,10 +263,14 @@ def main(arguments: list[str] | None = None) -> None:
     studies = [(study, study / given.results) for study in given.study]
     data = build(studies, given.worked, (given.real, given.recordings), given.book)
     given.output.mkdir(parents=True, exist_ok=True)
+    table = given.output / "proof.json"
+    if table.exists():
+        known = json.loads(table.read_text(encoding="utf-8"))
+        data |= {part: known[part] for part in ("riddles", "programs", "real") if not data[part]}
     from .proof_pictures import draw_all
 
     draw_all(data, {study.name: (study, results) for study, results in studies}, given.output)
-    (given.output / "proof.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    table.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     (given.output / "README.md").write_text(render(data), encoding="utf-8")
     print(f"{given.output / 'README.md'}: {sum(len(s['rows']) for s in data['studies'])} cases")
 

@@ -128,7 +128,7 @@ def score_row(answer: dict[str, Any], diagnosis: dict[str, Any], folder: Path) -
         "intervals": [c for c in coverage(answer, here) if c["same_extent"]],
         "before_over_noise": before / noise if before else None,
         "after_over_noise": after / noise if after else None,
-        "wall_s": json.loads(timing.read_text(encoding="utf-8"))["wall_s"] if timing.exists() else None,
+        "cpu_s": json.loads(timing.read_text(encoding="utf-8"))["cpu_s"] if timing.exists() else None,
         "failed": False,
     }
 
@@ -193,7 +193,7 @@ def figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "intervals_hold": share(stated, "inside"),
         "states_f1": middle([r.get("states_f1") for r in shown if r.get("states_seen")]),
         "after_over_noise": middle([r.get("after_over_noise") for r in clear if r["set_first"]]),
-        "wall_s": middle([r.get("wall_s") for r in rows]),
+        "cpu_s": middle([r.get("cpu_s") for r in rows]),
     }
 
 
