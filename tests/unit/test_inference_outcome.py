@@ -155,7 +155,7 @@ def test_laws_are_extended_beside_a_way_out(case, heated):
 class Tabled(Search):
     """A search whose fits have the evidence of a table."""
 
-    def fit_all(self, tasks):
+    def fit_all(self, tasks, again=False):
         for candidates, values in tasks:
             keys = frozenset((c.effect, c.component) for c in candidates)
             fit = SimpleNamespace(

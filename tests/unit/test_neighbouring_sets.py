@@ -64,7 +64,7 @@ class NotingSearch:
         """The set that would be fitted."""
         return (*fit.candidates, *(variant.candidate for variant, _ in additions)), {}
 
-    def fit_all(self, tasks):
+    def fit_all(self, tasks, again=False):
         """Note what is asked."""
         self.asked = {identity(candidates) for candidates, _ in tasks}
 
