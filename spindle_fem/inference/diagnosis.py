@@ -254,12 +254,15 @@ def _begun_with_more(problem: Problem, item: Hypothesis, fitted: Sequence[Hypoth
 
 
 def _likelier_about(problem: Problem, fit: Fit) -> bool:
-    """Whether a set is likelier by what directions do in another problem than in that of its own fit."""
+    """Whether a set is likelier by what directions do in another problem than in that of its own fit.
+
+    By more than what a fit that begins at the end of another gains anyway: all sets are fitted again then.
+    """
     try:
         again = problem.fit(fit.candidates, fit.values)
     except NOT_SIMULATED:
         return False
-    return again.misfit_with_prior < fit.misfit_with_prior
+    return again.misfit_with_prior < fit.misfit_with_prior - 2.0 * tuned.WORTH_ANOTHER
 
 
 def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:
