@@ -158,17 +158,23 @@ def predictions_at_stamps(predictor: Predictor, fit: Fit) -> list[Array]:
 
     Displacements, in µm, count from the sensor's zero, which is estimated from the readings.
     """
-    found = []
-    for number, recording in enumerate(predictor.recordings):
-        kelvins = recording.temperature_count
-        on_grid = predictor.predict(number, fit.values, fit.candidates).temperature
-        grid = predictor.drives[number].grid
-        columns = [np.interp(recording.times, grid, column) for column in on_grid.T]
-        told = np.array(columns).T
-        apart = np.where(recording.usable, recording.temperature - told, np.nan)[:, kelvins:]
-        told[:, kelvins:] += [np.nanmean(own) if np.isfinite(own).any() else 0.0 for own in apart.T]
-        found.append(told)
-    return found
+    return [
+        at_stamps(predictor, number, predictor.predict(number, fit.values, fit.candidates).temperature)
+        for number in range(len(predictor.recordings))
+    ]
+
+
+def at_stamps(predictor: Predictor, number: int, on_grid: Array) -> Array:
+    """Readings (N, c) of every channel of a recording at its stamps, from those on its grid (G + 1, c).
+
+    Displacements then count from the sensor's zero, which is estimated from the readings.
+    """
+    recording, grid = predictor.recordings[number], predictor.drives[number].grid
+    kelvins = recording.temperature_count
+    told = np.array([np.interp(recording.times, grid, column) for column in on_grid.T]).T
+    apart = np.where(recording.usable, recording.temperature - told, np.nan)[:, kelvins:]
+    told[:, kelvins:] += [np.nanmean(own) if np.isfinite(own).any() else 0.0 for own in apart.T]
+    return told
 
 
 def rmse(predictor: Predictor, predicted: Sequence[Array], *, heldout: bool) -> float:

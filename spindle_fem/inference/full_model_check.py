@@ -24,12 +24,20 @@ from spindle_fem.errors import SpecError, SpindleFemError, WorkerDiedError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, FIRST_ORDER
 from spindle_fem.inference.diagnosis import Diagnosis
-from spindle_fem.inference.findings import channel_errors, channel_noise, predictions_at_stamps, rmse
+from spindle_fem.inference.findings import (
+    at_stamps,
+    channel_errors,
+    channel_noise,
+    displacement_errors,
+    predictions_at_stamps,
+    rmse,
+)
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.parallel import WorkerPool, one_thread, thread_count
+from spindle_fem.recordings.displaced_readings import MICROMETRES
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_transient import simulate_full, start_at
@@ -69,7 +77,8 @@ class FullFit:
     Attributes
     ----------
     predicted : tuple of (N, c) ndarray, [K]
-        What every channel of every recording should read, at its stamps.
+        What every channel of every recording should read, at its stamps; of a displacement in µm, from the
+        sensor's zero.
     steps : int
         Time steps over all recordings.
     seconds : float, [s]
@@ -131,10 +140,11 @@ def full_model_errors(
         ``mesh`` (as requested or chosen), ``reason`` (why nothing was run, else
         None), and what was run: ``preset``, ``order``, ``unknowns``,
         ``step_error_K``, ``coupling_tolerance_K``, ``before`` and ``after`` (``train_rmse_K``,
-        ``heldout_rmse_K``, ``channels``, ``steps``, ``seconds``),
+        ``heldout_rmse_K``, ``channels``, ``displacements``, ``steps``, ``seconds``),
         ``differences`` (largest difference of full and reduced model at each
         channel: ``before_K``, ``after_K`` and, of what the fits differ by,
-        ``change_K``), ``first_order`` (what the reduced model supplied).
+        ``change_K``), ``displacement_differences`` (the same in ``_um``, but for
+        where the sensor was set), ``first_order`` (what the reduced model supplied).
 
     Raises
     ------
@@ -216,11 +226,12 @@ def _both_fits(
             "train_rmse_K": rmse(predictor, full.predicted, heldout=False),
             "heldout_rmse_K": rmse(predictor, full.predicted, heldout=True),
             "channels": channel_errors(predictor, full.predicted),
+            "displacements": displacement_errors(predictor, full.predicted),
             "steps": full.steps,
             "seconds": full.seconds,
         }
         reduced = predictions_at_stamps(predictor, fits[name])
-        apart[name] = [a - b[:, : a.shape[1]] for a, b in zip(full.predicted, reduced, strict=True)]
+        apart[name] = [a - b for a, b in zip(full.predicted, reduced, strict=True)]
     supplied = any(n.startswith(FIRST_ORDER) for fit in fits.values() for n in fit.values)
     return {
         "mesh": mesh,
@@ -231,7 +242,8 @@ def _both_fits(
         "step_error_K": options.error,
         "coupling_tolerance_K": options.coupling_tolerance,
         **found,
-        "differences": _differences(predictor, apart),
+        "differences": _differences(predictor, apart, "K"),
+        "displacement_differences": _differences(predictor, apart, "um"),
         "first_order": FIRST_ORDER_NOTE if supplied else None,
     }
 
@@ -252,12 +264,10 @@ def run_fit(machine: PreparedMachine, predictor: Predictor, fit: Fit, options: T
     """
     began = time.perf_counter()
     predicted, steps = [], 0
-    for number, recording in enumerate(predictor.recordings):
+    for number in range(len(predictor.recordings)):
         run = _run(machine, predictor, number, fit, options)
         steps += len(run.steps.times)
-        on_grid = _readings(predictor, number, fit, run)
-        grid = predictor.drives[number].grid
-        predicted.append(np.array([np.interp(recording.times, grid, column) for column in on_grid.T]).T)
+        predicted.append(at_stamps(predictor, number, _readings(predictor, number, fit, run)))
     return FullFit(tuple(predicted), steps, time.perf_counter() - began)
 
 
@@ -362,17 +372,19 @@ def _run(
 
 
 def _readings(predictor: Predictor, number: int, fit: Fit, run: MachineTransient) -> Array:
-    """Readings of the temperature channels in a full run, on the reduced model's grid, (G + 1, c) K."""
+    """Readings of every channel in a full run, on the reduced model's grid, (G + 1, c) K, displacements µm."""
     recording = predictor.recordings[number]
     count = recording.temperature_count
-    told = np.column_stack([run.reading(probe) for probe in recording.probes[:count]])
+    temperatures = [run.reading(probe) for probe in recording.probes[:count]]
+    displacements = [MICROMETRES * run.motion_of(sensor) for sensor in recording.probes[count:]]
+    told = np.column_stack([*temperatures, *displacements])
     told = predictor.read(number, predictor.effects.candidates, {}, told)
-    told = told + _first_order(predictor, number, fit, count)
+    told = told + _first_order(predictor, number, fit)
     return predictor.read(number, _acting(fit.candidates, number), fit.values, told)
 
 
-def _first_order(predictor: Predictor, number: int, fit: Fit, count: int) -> Array | float:
-    """First-order changes by probe positions and gaps, before the fit's sensor effects, (G + 1, n) K."""
+def _first_order(predictor: Predictor, number: int, fit: Fit) -> Array | float:
+    """First-order changes by probe positions and gaps, before the fit's sensor effects, (G + 1, c) K, µm."""
     if not any(name.startswith(FIRST_ORDER) for name in fit.values):
         return 0.0
     bare = [replace(item, reading=None) for item in fit.candidates]
@@ -381,11 +393,16 @@ def _first_order(predictor: Predictor, number: int, fit: Fit, count: int) -> Arr
     values = {name: value for name, value in fit.values.items() if name not in of_readings}
     plain = {name: value for name, value in values.items() if not name.startswith(FIRST_ORDER)}
     moved, still = (predictor.predict(number, item, bare).temperature for item in (values, plain))
-    return (moved - still)[:, :count]
+    return moved - still
 
 
-def _differences(predictor: Predictor, apart: Mapping[str, Sequence[Array]]) -> list[Mapping[str, Any]]:
-    """Largest difference of full and reduced model at each channel, and of how much the fits differ."""
+def _differences(
+    predictor: Predictor, apart: Mapping[str, Sequence[Array]], unit: str
+) -> list[Mapping[str, Any]]:
+    """Largest difference of full and reduced model at each channel, and of how much the fits differ.
+
+    Of temperatures with the unit ``K``, of displacements with ``um``.
+    """
     several = len(predictor.recordings) > 1
     change = [after - before for before, after in zip(apart["before"], apart["after"], strict=True)]
     return [
@@ -393,10 +410,11 @@ def _differences(predictor: Predictor, apart: Mapping[str, Sequence[Array]]) -> 
             "channel": name,
             **({"recording": recording.name} if several else {}),
             **{
-                f"{key}_K": float(np.abs(values[number][:, column]).max())
+                f"{key}_{unit}": float(np.abs(values[number][:, column]).max())
                 for key, values in {**apart, "change": change}.items()
             },
         }
         for number, recording in enumerate(predictor.recordings)
-        for column, name in enumerate(recording.temperature_names[: recording.temperature_count])
+        for column, name in enumerate(recording.temperature_names)
+        if (column < recording.temperature_count) == (unit == "K")
     ]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.hypothesis_fit import Fit, Problem, candidate_coordinates
+from spindle_fem.inference.innovations import ZERO_SIGMA
 from spindle_fem.inference.missing_heat import Pattern
 from spindle_fem.inference.switching_model import LinearAnswer, Readings
 
@@ -87,11 +88,13 @@ def readings_about(
     slow = [problem.slow.of(channel) for channel in range(usable.shape[1])]
     residual = np.full((len(grid), usable.shape[1]), np.nan)
     variance = np.ones_like(residual)
-    # The zero of a displacement sensor is unknown: its level carries no information on the state.
-    for channel in range(recording.temperature_count):
+    for channel in range(usable.shape[1]):
         rows = np.flatnonzero(usable[:, channel])
         left = recording.temperature[rows, channel]
         left = left - np.interp(recording.times[rows], grid, model[:, channel])
+        if channel >= recording.temperature_count and rows.size:
+            # A displacement counts from a zero that is unknown: a coordinate beside its slopes.
+            left = left - left[0]
         count = np.bincount(owner[rows], minlength=len(grid))
         seen = count > 0
         residual[seen, channel] = np.bincount(owner[rows], left, minlength=len(grid))[seen] / count[seen]
@@ -100,11 +103,17 @@ def readings_about(
     return Readings(
         residual[1:],
         variance[1:],
-        np.ascontiguousarray(slopes[1:]),
+        np.ascontiguousarray(_with_zeros(slopes[1:], recording.temperature_count)),
         np.diff(grid),
         np.array([item.sigma for item in slow]),
         np.array([item.time for item in slow]),
     )
+
+
+def _with_zeros(slopes: Array, temperatures: int) -> Array:
+    """Slopes (T, c, p) and, as further coordinates, the zero of each displacement (after the temperatures)."""
+    zeros = np.eye(slopes.shape[1])[:, temperatures:]
+    return np.concatenate((slopes, np.broadcast_to(ZERO_SIGMA * zeros, (len(slopes), *zeros.shape))), axis=2)
 
 
 def intervals_of(on: NDArray[np.bool_], grid: Array) -> list[tuple[float, float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from spindle_fem.report.block_page import Notice, Section, Table, Text
@@ -39,14 +39,19 @@ def _words(found: Mapping[str, Any]) -> str:
     )
     text += (
         " Its mesh is not that of the fast model: readings are up to "
-        f"{_largest(found, 'after_K'):.2g} K apart. On what the two fits differ by, both models agree within "
-        f"{_largest(found, 'change_K'):.2g} K."
+        f"{_largest(found['differences'], 'after_K'):.2g} K apart. On what the two fits differ by, both models agree within "
+        f"{_largest(found['differences'], 'change_K'):.2g} K."
     )
+    if moved := found["displacement_differences"]:
+        text += (
+            f" Displacements are up to {_largest(moved, 'after_um'):.2g} µm apart, on what the fits differ by "
+            f"{_largest(moved, 'change_um'):.2g} µm."
+        )
     return text + (f" Not of the mesh but added: {found['first_order']}." if found["first_order"] else "")
 
 
-def _largest(found: Mapping[str, Any], key: str) -> float:
-    return max(row[key] for row in found["differences"])
+def _largest(differences: Sequence[Mapping[str, Any]], key: str) -> float:
+    return max(row[key] for row in differences)
 
 
 def _tables(content: Mapping[str, Any], found: Mapping[str, Any]) -> list[Table]:
@@ -66,34 +71,49 @@ def _tables(content: Mapping[str, Any], found: Mapping[str, Any]) -> list[Table]
     noise = fixed("noise / K", "noise_K", 3)
     level = noise.cell(fit)
     by_model.rows.append({"cells": ["noise", level, level, ""]})
-    sources = {
+    temperatures = {
         "before, fast model": content["mismatch"]["channels"],
         "before, full model": found["before"]["channels"],
         "after, fast model": fit["channels_after"],
         "after, full model": found["after"]["channels"],
     }
-    named = (*recording_fields(found["differences"]), words("channel", "channel"))
-    channels = (
+    tables = [by_model, *_by_channel(temperatures, found["differences"], "channel", "K")]
+    if found["displacement_differences"]:
+        displacements = {
+            "before, fast model": content["mismatch"]["displacements"],
+            "before, full model": found["before"]["displacements"],
+            "after, fast model": fit["displacements_after"],
+            "after, full model": found["after"]["displacements"],
+        }
+        tables += _by_channel(displacements, found["displacement_differences"], "sensor", "um")
+    return tables
+
+
+def _by_channel(
+    sources: Mapping[str, Sequence[Mapping[str, Any]]],
+    differences: Sequence[Mapping[str, Any]],
+    what: str,
+    unit: str,
+) -> list[Table]:
+    """Errors of both models at each channel, and by how much the models differ there, in ``K`` or ``um``."""
+    shown = unit.replace("um", "µm")
+    named = (*recording_fields(differences), words(what, "channel"))
+    errors = (
         *named,
-        *(fixed(f"{name} / K", name, 3) for name in sources),
-        noise,
+        *(fixed(f"{name} / {shown}", name, 3) for name in sources),
+        fixed(f"noise / {shown}", f"noise_{unit}", 3),
     )
     rows = [
-        {**row, **{name: source[index]["rmse_K"] for name, source in sources.items()}}
-        for index, row in enumerate(found["after"]["channels"])
+        {**row, **{name: source[index][f"rmse_{unit}"] for name, source in sources.items()}}
+        for index, row in enumerate(sources["after, full model"])
     ]
-    differences = (
+    apart = (
         *named,
-        fixed("before / K", "before_K", 3),
-        fixed("after / K", "after_K", 3),
-        fixed("of what they differ by / K", "change_K", 3),
+        fixed(f"before / {shown}", f"before_{unit}", 3),
+        fixed(f"after / {shown}", f"after_{unit}", 3),
+        fixed(f"of what they differ by / {shown}", f"change_{unit}", 3),
     )
     return [
-        by_model,
-        table_of(channels, rows, "Root mean square error of each channel over all its readings."),
-        table_of(
-            differences,
-            found["differences"],
-            "Largest difference of the full model from the fast one at each channel.",
-        ),
+        table_of(errors, rows, f"Root mean square error of each {what} over all its readings."),
+        table_of(apart, differences, f"Largest difference of the full model from the fast one at each {what}."),
     ]

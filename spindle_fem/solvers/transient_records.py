@@ -225,3 +225,7 @@ class MachineTransient:
     def reading(self, probe: str) -> Array:
         """Readings of one probe, (n,) [K]."""
         return self.readings[:, self.probes.index(probe)]
+
+    def motion_of(self, name: str) -> Array:
+        """One motion of the nose, or what a displacement sensor reads, since assembly, (n,) [m] or [rad]."""
+        return self.motion[:, self.motions.index(name)]

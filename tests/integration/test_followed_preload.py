@@ -69,7 +69,7 @@ def measured(tmp_path_factory):
     for name in ("SP01", "SP05"):
         frame[name] = full.reading(name) - 273.15
     for name in ("S1", "S2"):
-        frame[name] = 1e6 * full.motion[:, full.motions.index(name)] + 120.0
+        frame[name] = 1e6 * full.motion_of(name) + 120.0
     frame.to_csv(place / "made.csv", index=False)
     return SimpleNamespace(place=place, machine=machine, spec=spec, full=full)
 
@@ -80,7 +80,7 @@ def test_simulate_follows_preload_and_growth_as_the_full_model_does(measured, tm
     assert max(channel["max_K"] for channel in found["channels"]) < 0.05
     frame = pd.read_csv(tmp_path / "simulated.csv")
     for name in ("S1", "S2"):
-        told = measured.full.motion[:, measured.full.motions.index(name)]
+        told = measured.full.motion_of(name)
         own = next(column for column in frame if name in column)
         assert np.abs(frame[own].to_numpy() - 1e6 * (told - told[0])).max() < 0.2
         assert np.ptp(told) > 3e-6

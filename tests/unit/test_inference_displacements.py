@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from spindle_fem.effects.registry import candidates_for
-from spindle_fem.inference import tuned
+from spindle_fem.inference import full_model_check, tuned
 from spindle_fem.inference.calibration import calibrate
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.diagnosis import diagnose_recordings
@@ -24,9 +24,12 @@ from spindle_fem.inference.findings import (
 )
 from spindle_fem.inference.growth_misdescriptions import growth_misdescriptions
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
+from spindle_fem.inference.hidden_states import answer_of, readings_about
 from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.innovations import ZERO_SIGMA
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.misdescription_content import misdescription_content
+from spindle_fem.inference.missing_heat import Pattern
 from spindle_fem.inference.next_measurement import EXISTING, next_measurement, reading_covariance
 from spindle_fem.inference.opened_machine import DiagnosedMachine, with_growth
 from spindle_fem.inference.predictor import Predictor
@@ -38,6 +41,7 @@ from spindle_fem.inference.reading_noise import (
     channel_bins,
     likely_slow_error,
 )
+from spindle_fem.inference.switching_model import Chain, ReadingFilter, find_course
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
@@ -46,6 +50,7 @@ from spindle_fem.recordings.compare import write_simulated
 from spindle_fem.recordings.conditions import operating_conditions
 from spindle_fem.recordings.displaced_readings import with_displacements
 from spindle_fem.report.diagnosis_data import diagnosis_dataset
+from spindle_fem.report.diagnosis_full_model import full_model_sections
 from spindle_fem.report.diagnosis_tables import channel_table, misdescription_blocks, next_blocks
 from spindle_fem.report.read_against_predicted import displaced_before_after
 from tests.support.nose_spindle import RUN, nose_machine, nose_recording
@@ -315,6 +320,97 @@ def test_displacements_are_drawn_in_micrometres_beside_both_models():
 def test_heating_follows_from_temperatures_alone(recording):
     shrinking = replace(recording, displacements=-50.0 * recording.displacements)
     assert operating_conditions(with_displacements(shrinking)).names == ("heating",)
+
+
+def test_a_hidden_state_is_sought_in_displacements_too(heated):
+    """What they say of a course does not hang on their zero, and is more than temperatures say alone."""
+    opened, _ = heated
+    found = {}
+    for name, machine in (("without", opened), ("with", with_growth(opened)), ("moved", with_growth(opened))):
+        predictor = Predictor(machine.fast, machine.recordings)
+        if name == "moved":
+            recording = machine.recordings[0]
+            shifted = recording.temperature + [0.0, 0.0, 57.0]
+            predictor = Predictor(machine.fast, [replace(recording, temperature=shifted)])
+        problem = Problem(predictor, known_before(predictor), EXPECTED_SLOW, predictor.observations)
+        fit = problem.fit()
+        base = BaseRun(predictor, 0, fit.values, ())
+        answer = answer_of(base, Pattern("drive_end", ("shaft",)))
+        readings = ReadingFilter(readings_about(problem, fit, 0))
+        chain = Chain.usual(np.zeros(len(answer.group), dtype=np.int64))
+        found[name] = find_course(answer, readings, chain, 100.0, 1000.0)
+    assert found["with"].log_evidence > 3.0 * found["without"].log_evidence
+    assert found["moved"].log_evidence == pytest.approx(found["with"].log_evidence, rel=1e-6)
+    np.testing.assert_array_equal(found["moved"].on, found["with"].on)
+
+
+def test_the_zero_of_a_displacement_is_free_while_a_state_is_sought(heated):
+    """Filtered readings of the sensor alone have the likelihood of a Gaussian with a very wide constant."""
+    opened = with_growth(heated[0])
+    predictor = Predictor(opened.fast, opened.recordings)
+    slow = expected_slow_error(predictor)
+    problem = Problem(predictor, known_before(predictor), slow, predictor.observations)
+    found = readings_about(problem, problem.fit(), 0)
+    only = np.where([False, False, True], found.residual, np.nan)
+    bare = replace(found, residual=only, slopes=np.ascontiguousarray(found.slopes[:, :, -1:]))
+    assert (bare.slopes[:, :, 0] == [0.0, 0.0, ZERO_SIGMA]).all()
+    ours = float(np.sum(ReadingFilter(bare).innovations() ** 2))
+    seen = np.isfinite(only[:, 2])
+    times, values = np.cumsum(found.steps)[seen], only[seen, 2]
+    own = slow.of(2)
+    apart = np.abs(times[:, None] - times)
+    covariance = own.sigma**2 * np.exp(-apart / own.time) + np.diag(found.variance[seen, 2]) + ZERO_SIGMA**2
+    assert ours == pytest.approx(values @ np.linalg.solve(covariance, values), rel=1e-6)
+
+
+def test_the_full_model_checks_displacements_in_micrometres(heated, monkeypatch):
+    """A mesh that answers as the fast model does, but for 1 % of growth and a zero of its own."""
+    opened = with_growth(heated[0])
+    predictor = Predictor(opened.fast, opened.recordings)
+    fit = Problem(predictor, known_before(predictor), EXPECTED_SLOW, predictor.observations).fit()
+    told = predictor.predict(0, fit.values).temperature
+
+    def run(machine, predictor, number, fit, options):
+        readings = dict(zip(("SP01", "SP05"), told.T, strict=False))
+        moved = {"S1": 1e-6 * (1.01 * told[:, 2] + 250.0)}
+        steps = SimpleNamespace(times=[0.0])
+        return SimpleNamespace(steps=steps, reading=readings.get, motion_of=moved.get)
+
+    prepared = SimpleNamespace(spec=predictor.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    monkeypatch.setattr(full_model_check, "prepare_machine", lambda spec: prepared)
+    monkeypatch.setattr(full_model_check, "_run", run)
+    diagnosis = SimpleNamespace(predictor=predictor, null=fit, final=fit)
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
+    kept = {}
+    found = full_model_check.full_model_errors(diagnosis, machine, keep=kept.__setitem__)
+    assert found["reason"] is None
+    assert [row["channel"] for row in found["differences"]] == ["SP01", "SP05"]
+    assert all(row["before_K"] == 0.0 for row in found["differences"])
+    (row,) = found["displacement_differences"]
+    # Of readings from a zero of their own: 1 % of how far growth goes from its mean.
+    away = told[:, 2] - np.interp(RUN, predictor.drives[0].grid, told[:, 2]).mean()
+    assert row["before_um"] == pytest.approx(0.01 * np.abs(away).max(), rel=1e-3)
+    assert [item["channel"] for item in found["before"]["displacements"]] == ["S1"]
+    assert kept["before"][0].shape == (RUN.size, 3)
+    noise = predictions_at_stamps(predictor, fit)
+    content = {
+        "mismatch": {
+            "channels": channel_errors(predictor, noise),
+            "displacements": displacement_errors(predictor, noise),
+        },
+        "fit": {
+            "before": {"train_rmse_K": 1.0, "heldout_rmse_K": 1.0},
+            "after": {"train_rmse_K": 1.0, "heldout_rmse_K": 1.0},
+            "noise_K": 0.1,
+            "channels_after": channel_errors(predictor, noise),
+            "displacements_after": displacement_errors(predictor, noise),
+            "full_model": found,
+        },
+    }
+    (section,) = full_model_sections(content)
+    words, *tables = section.blocks
+    assert "µm apart" in words.text
+    assert [table.rows[0]["cells"][0] for table in tables[1:]] == ["SP01", "SP01", "S1", "S1"]
 
 
 @pytest.fixture(scope="module")
