@@ -330,7 +330,7 @@ def test_a_hidden_state_is_sought_in_displacements_too(heated):
         predictor = Predictor(machine.fast, machine.recordings)
         if name == "moved":
             recording = machine.recordings[0]
-            shifted = recording.temperature + [0.0, 0.0, 57.0]
+            shifted = recording.temperature + np.array([0.0, 0.0, 57.0])
             predictor = Predictor(machine.fast, [replace(recording, temperature=shifted)])
         problem = Problem(predictor, known_before(predictor), EXPECTED_SLOW, predictor.observations)
         fit = problem.fit()
