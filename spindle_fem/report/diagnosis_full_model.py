@@ -115,5 +115,7 @@ def _by_channel(
     )
     return [
         table_of(errors, rows, f"Root mean square error of each {what} over all its readings."),
-        table_of(apart, differences, f"Largest difference of the full model from the fast one at each {what}."),
+        table_of(
+            apart, differences, f"Largest difference of the full model from the fast one at each {what}."
+        ),
     ]
