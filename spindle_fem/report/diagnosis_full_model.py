@@ -44,8 +44,8 @@ def _words(found: Mapping[str, Any]) -> str:
     )
     if moved := found["displacement_differences"]:
         text += (
-            f" Displacements are up to {_largest(moved, 'after_um'):.2g} µm apart, on what the fits differ by "
-            f"{_largest(moved, 'change_um'):.2g} µm."
+            f" Displacements are up to {_largest(moved, 'after_um'):.2g} µm apart, on what the fits differ "
+            f"by {_largest(moved, 'change_um'):.2g} µm."
         )
     return text + (f" Not of the mesh but added: {found['first_order']}." if found["first_order"] else "")
 
