@@ -384,7 +384,7 @@ def _readings(predictor: Predictor, number: int, fit: Fit, run: MachineTransient
 
 
 def _first_order(predictor: Predictor, number: int, fit: Fit) -> Array | float:
-    """First-order changes by probe positions and gaps, before the fit's sensor effects, (G + 1, c) K, µm."""
+    """First-order changes by probe positions and gaps, before the fit's sensor effects, (G + 1, c)."""
     if not any(name.startswith(FIRST_ORDER) for name in fit.values):
         return 0.0
     bare = [replace(item, reading=None) for item in fit.candidates]

@@ -111,7 +111,7 @@ def readings_about(
 
 
 def _with_zeros(slopes: Array, temperatures: int) -> Array:
-    """Slopes (T, c, p) and, as further coordinates, the zero of each displacement (after the temperatures)."""
+    """Slopes (T, c, p) and the zero of each displacement, which follow the temperatures, as coordinates."""
     zeros = np.eye(slopes.shape[1])[:, temperatures:]
     return np.concatenate((slopes, np.broadcast_to(ZERO_SIGMA * zeros, (len(slopes), *zeros.shape))), axis=2)
 

@@ -39,8 +39,8 @@ def _words(found: Mapping[str, Any]) -> str:
     )
     text += (
         " Its mesh is not that of the fast model: readings are up to "
-        f"{_largest(found['differences'], 'after_K'):.2g} K apart. On what the two fits differ by, both models agree within "
-        f"{_largest(found['differences'], 'change_K'):.2g} K."
+        f"{_largest(found['differences'], 'after_K'):.2g} K apart. On what the two fits differ by, both "
+        f"models agree within {_largest(found['differences'], 'change_K'):.2g} K."
     )
     if moved := found["displacement_differences"]:
         text += (
