@@ -372,7 +372,7 @@ def _run(
 
 
 def _readings(predictor: Predictor, number: int, fit: Fit, run: MachineTransient) -> Array:
-    """Readings of every channel in a full run, on the reduced model's grid, (G + 1, c) K, displacements µm."""
+    """Readings of every channel in a full run, on the reduced model's grid, (G + 1, c) K or µm."""
     recording = predictor.recordings[number]
     count = recording.temperature_count
     temperatures = [run.reading(probe) for probe in recording.probes[:count]]
