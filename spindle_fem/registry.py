@@ -153,17 +153,18 @@ def source_from_outside(package: str) -> str:
     group = package.rpartition(".")[2]
     files = [find_spec(entry.module) for entry in entry_points(group).values()]
     sources = [Path(str(found.origin)) for found in files if found is not None and found.origin]
-    told = []
+    descriptions = []
     for thing in ADDED.get(group, {}).values():
         module = getattr(thing, "__module__", "")
         file = getattr(sys.modules.get(module), "__file__", None)
         if file is None or module.partition(".")[0] == __name__.partition(".")[0]:
-            told.append(repr(thing))
+            descriptions.append(repr(thing))
         else:
             sources.append(Path(file))
-    if not sources and not told:
+    if not sources and not descriptions:
         return ""
-    content = [path.read_bytes() for path in sorted(sources)] + [text.encode() for text in sorted(told)]
+    content = [path.read_bytes() for path in sorted(sources)]
+    content += [text.encode() for text in sorted(descriptions)]
     return hashlib.sha256(b"\0".join(content)).hexdigest()
 
 

@@ -71,9 +71,9 @@ def _print_rows(console: Console, content: Mapping[str, Any], bearings: Sequence
         "rating life h": lambda item: _shown(item.get("rating_life_h"), 0),
     }
     for name, tell in lines.items():
-        told = [tell(bearing) for bearing in bearings]
-        if any(text != "–" for text in told):
-            table.add_row(name, *told)
+        texts = [tell(bearing) for bearing in bearings]
+        if any(text != "–" for text in texts):
+            table.add_row(name, *texts)
     console.print(table)
     words = {
         "axial_stiffness_N_um": "axial stiffness {:.4g} N/µm",
@@ -81,9 +81,9 @@ def _print_rows(console: Console, content: Mapping[str, Any], bearings: Sequence
     }
     if len(bearings) > 1:
         words |= {"heat_W": "heat of the set {:.4g} W", "rating_life_h": "rating life of the set {:,.0f} h"}
-    told = [text.format(content[key]) for key, text in words.items() if content.get(key) is not None]
-    if told:
-        console.print(", ".join(told))
+    texts = [text.format(content[key]) for key, text in words.items() if content.get(key) is not None]
+    if texts:
+        console.print(", ".join(texts))
 
 
 def _print_heat(console: Console, content: Mapping[str, Any], bearings: Sequence[Mapping[str, Any]]) -> None:
@@ -92,8 +92,8 @@ def _print_heat(console: Console, content: Mapping[str, Any], bearings: Sequence
     names = list(dict.fromkeys(term for bearing in bearings for term in bearing["terms_W"]))
     table = headed_table("Heat W", "", *(str(bearing["name"]) for bearing in bearings))
     for name in names:
-        told = (_shown(bearing["terms_W"].get(name), 2) for bearing in bearings)
-        table.add_row(name.replace("_", " "), *told)
+        texts = (_shown(bearing["terms_W"].get(name), 2) for bearing in bearings)
+        table.add_row(name.replace("_", " "), *texts)
     console.print(table)
 
 

@@ -346,15 +346,15 @@ def _best_designs(content: dict[str, Any]) -> list[str]:
         for item in (*content["parameters"], *content["outputs"])
     }
 
-    def told(values: dict[str, Any]) -> str:
+    def listed(values: dict[str, Any]) -> str:
         shown = ((path, scales[path], value) for path, value in values.items() if path in scales)
         return ", ".join(
             f"{path} = {scale.text(value)} {scale.unit}".rstrip() for path, scale, value in shown
         )
 
     return [
-        f"best ({wanted}): design {best['design']}, {told(best['parameters'])}",
-        f"  there {told(best['outputs'])}",
+        f"best ({wanted}): design {best['design']}, {listed(best['parameters'])}",
+        f"  there {listed(best['outputs'])}",
     ]
 
 

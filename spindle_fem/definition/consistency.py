@@ -395,7 +395,7 @@ def _factors(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]
 
 
 def _probes(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:
-    # A circuit, or a set that makes streams, whose own fault is told.
+    # A circuit, or a set that makes streams, whose own fault is reported.
     unread = list(declared.names["film"]) if "film" in declared.unsound else []
     if "bearing_set" in declared.unsound:
         unread += [f"{name}.lubrication" for name in declared.names["bearing"]]

@@ -261,9 +261,9 @@ def examine(content: Mapping[str, Any], layers: Iterable[Layer] | str = "machine
     faults = [*unknown_catalogues(content), *faults]
     keys = [field.alias or name for name, field in MachineSpec.model_fields.items()]
     unsound = frozenset(key for key in keys if any(_is_inside(fault.where, key) for fault in faults))
-    told = [fault.where for fault in faults]
+    reported = [fault.where for fault in faults]
     found = find_faults(spec, Declared.of(content, unsound))
-    between = [fault for fault in found if not any(_is_inside(fault.where, where) for where in told)]
+    between = [fault for fault in found if not any(_is_inside(fault.where, where) for where in reported)]
     can_be_built = not unsound & _GEOMETRY_KEYS and not any(
         _concerns_geometry(fault.where) for fault in between
     )

@@ -59,7 +59,7 @@ class Coordinate:
 
 @dataclass(frozen=True, slots=True)
 class GivenUp:
-    """By how much earlier readings are told worse than where they are fitted best.
+    """By how much earlier readings are predicted worse than by their own best fit.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Witness(Protocol):
         """Derivatives of the residuals by the coordinates, (n, p); ``near`` are the predictions there."""
 
     def given_up(self, coordinates: Sequence[Coordinate], position: Array) -> GivenUp:
-        """By how much they are told worse than where they are fitted best."""
+        """By how much they are predicted worse than by their own best fit."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -243,7 +243,7 @@ class BaseRun:
             )
         return flow
 
-    def told(self) -> Array:
+    def predicted(self) -> Array:
         """Readings of the channels in this run, (G + 1, c) K."""
         if self._told is None:
             self._told = self.predictor.predict(self.number, self.values, self.candidates).temperature
@@ -252,8 +252,8 @@ class BaseRun:
     def _reading(self, variant: Variant) -> Array:
         """Difference of one channel that a sensor effect makes, (G + 1, c)."""
         values = self.values | variant.values(variant.candidate.reference)
-        told = self.told()
-        return self.predictor.read(self.number, [variant.candidate], values, told) - told
+        predicted = self.predicted()
+        return self.predictor.read(self.number, [variant.candidate], values, predicted) - predicted
 
     def _steady(self, variants: Sequence[Variant]) -> Array:
         """Constant changes of the operators, by their derivatives where they do nothing."""

@@ -129,7 +129,7 @@ def _fitted(
         slow = slow_error_of(problem, fit)
         problem = Problem(predictor, problem.belief, slow, predictor.observations)
         fit = problem.fit(candidates, fit.values, iterations=STEPS)
-    told = [
+    predicted = [
         predictor.predict(number, fit.values, candidates).temperature
         for number in range(len(machine.calibration))
     ]
@@ -137,7 +137,7 @@ def _fitted(
         left_over_noise(
             predictor,
             seen,
-            [item.at(told[item.recording][:, item.channel]) for item in seen],
+            [item.at(predicted[item.recording][:, item.channel]) for item in seen],
             fit.values,
         )
         for seen in (predictor.observations, predictor.heldout)

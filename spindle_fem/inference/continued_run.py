@@ -77,17 +77,17 @@ def _drive_of(fast: FastModel, piece: Recording) -> Drive:
     return replace(drive, times=drive.grid)
 
 
-def _end_of(told: Prediction, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:
+def _end_of(predicted: Prediction, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:
     """State at the end of a piece and its derivatives to coordinates, zero where they do not enter."""
-    slopes = np.zeros((told.states.shape[1], len(names)))
-    inside = told.columns >= 0
-    if told.tangents is not None:
-        slopes[:, inside] = told.tangents[-1][:, told.columns[inside]]
-    return told.states[-1], dict(zip(names, slopes.T, strict=True))
+    slopes = np.zeros((predicted.states.shape[1], len(names)))
+    inside = predicted.columns >= 0
+    if predicted.tangents is not None:
+        slopes[:, inside] = predicted.tangents[-1][:, predicted.columns[inside]]
+    return predicted.states[-1], dict(zip(names, slopes.T, strict=True))
 
 
 def _add(
-    told: Prediction,
+    predicted: Prediction,
     directions: Sequence[Misdescription],
     columns: Array,
     values: Mapping[str, float],
@@ -95,8 +95,8 @@ def _add(
 ) -> None:
     """Add what directions do to the readings, columns (G + 1, c, n), in place."""
     for index, item in enumerate(directions):
-        told.temperature[:] += values[item.coordinate] * columns[:, :, index]
-        told.sensitivity[:, :, names.index(item.coordinate)] += columns[:, :, index]
+        predicted.temperature[:] += values[item.coordinate] * columns[:, :, index]
+        predicted.sensitivity[:, :, names.index(item.coordinate)] += columns[:, :, index]
 
 
 class ContinuedRun:
@@ -147,15 +147,15 @@ class ContinuedRun:
             Averages of the readings after the first row.
         """
         predictor = _Piece(self.fast, piece, self.effects, self.begun)
-        told = predictor.predict(0, values, (), names)
-        self.begun, self._run = _end_of(told, names), told.run
-        self._misdescribe(predictor, told, values, names)
+        predicted = predictor.predict(0, values, (), names)
+        self.begun, self._run = _end_of(predicted, names), predicted.run
+        self._misdescribe(predictor, predicted, values, names)
         fresh = np.ones(piece.times.size, dtype=bool)
         fresh[0] = False
-        return told, observe([piece], [fresh], [predictor.drives[0].grid], [width])
+        return predicted, observe([piece], [fresh], [predictor.drives[0].grid], [width])
 
     def _misdescribe(
-        self, predictor: Predictor, told: Prediction, values: Mapping[str, float], names: Sequence[str]
+        self, predictor: Predictor, predicted: Prediction, values: Mapping[str, float], names: Sequence[str]
     ) -> None:
         """Add first-order changes of the readings by directions of misdescription, in place."""
         asked = [item for item in misdescriptions_of(predictor) if item.coordinate in names]
@@ -167,7 +167,7 @@ class ContinuedRun:
             differs = beside.predict(0, values, (), own)
             self._structural = _end_of(differs, own)
             amounts = np.array([item.change.amount for item in structural])
-            _add(told, structural, differs.sensitivity * amounts, values, names)
+            _add(predicted, structural, differs.sensitivity * amounts, values, names)
         directions = [item for item in asked if not isinstance(item.change, StructuralChange)]
         if not directions:
             return
@@ -178,7 +178,7 @@ class ContinuedRun:
             carried = base.run.tangents(np.zeros_like(states[1:]), base.tracks, start=start[None])
             channels, states = channels + base.outputs(carried), states + carried
         self._directions = {item.coordinate: states[-1, :, i] for i, item in enumerate(directions)}
-        _add(told, directions, channels, values, names)
+        _add(predicted, directions, channels, values, names)
 
     def slowest_time(self) -> float:
         """Longest time constant of the machine as it ran last, s."""

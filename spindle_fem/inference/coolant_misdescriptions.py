@@ -35,7 +35,7 @@ class StandingCoolant:
     def __call__(self, base: BaseRun) -> Change:
         """Change by one kelvin at the recording's first moment."""
         column = base.predictor.recordings[base.number].temperature_names.index(self.channel)
-        readings = np.zeros_like(base.told())
+        readings = np.zeros_like(base.predicted())
         grid = base.drive.grid
         readings[:, column] = np.exp(-(grid - grid[0]) / self.rinsing_time)
         return Change(direct=readings)

@@ -114,11 +114,11 @@ class EarlierReadings:
     def residual(self, coordinates: Sequence[Coordinate], position: Array) -> tuple[Array, list[Prediction]]:
         """Whitened residuals (n,) of the calibration for coordinates of the machine, and its predictions."""
         predicted = self._predicted(coordinates, position, (), None)
-        told = self.problem.whitened([p.temperature for p in predicted])
-        return self._counted(self.problem.data - told + self.offset), predicted
+        whitened = self.problem.whitened([p.temperature for p in predicted])
+        return self._counted(self.problem.data - whitened + self.offset), predicted
 
     def given_up(self, coordinates: Sequence[Coordinate], position: Array) -> GivenUp:
-        """By how much these readings are told worse than by their own fit."""
+        """By how much these readings are predicted worse than by their own fit."""
         residual, predicted = self.residual(coordinates, position)
         values = {c.name: c.at(u) for c, u in zip(coordinates, position, strict=True)}
         left, error = self._left(predicted, values)
@@ -133,11 +133,12 @@ class EarlierReadings:
         seen = self.problem.observations
         rest = self.problem.data - self.problem.whitened([p.temperature for p in predicted])
         moved = self.settled @ (rest + self.offset) - self.fitted
-        told = [
+        readings = [
             item.at(predicted[item.recording].temperature[:, item.channel]) + own @ moved
             for item, own in zip(seen, self.columns, strict=True)
         ]
-        return left_over_noise(self.problem.predictor, seen, told, factors), error_over_noise(seen, told)
+        left = left_over_noise(self.problem.predictor, seen, readings, factors)
+        return left, error_over_noise(seen, readings)
 
     def slopes(self, coordinates: Sequence[Coordinate], position: Array, near: list[Prediction]) -> Array:
         """Derivatives of :meth:`residual` by the coordinates, (n, p)."""

@@ -86,8 +86,8 @@ class FollowedReadings:
     def residuals(self, fit: Fit) -> list[tuple[ChannelBins, Array]]:
         """Predicted less read, K, averaged over the bins of every observation that was fitted."""
         seen = self._plant.observations
-        told = self._told_by_all(fit, seen)
-        return [(item.bins, values - item.values) for item, values in zip(seen, told, strict=True)]
+        predicted = self._predicted_by_all(fit, seen)
+        return [(item.bins, values - item.values) for item, values in zip(seen, predicted, strict=True)]
 
     def beyond(self, fit: Fit) -> float:
         """Residual of held-out readings likewise; switching states follow all readings."""
@@ -96,7 +96,7 @@ class FollowedReadings:
         return self._left_of(self._plant.heldout, fit)
 
     def _left_of(self, seen: Sequence[Observation], fit: Fit) -> float:
-        left = left_over_noise(self._plant, seen, self._told_by_all(fit, seen), fit.values)
+        left = left_over_noise(self._plant, seen, self._predicted_by_all(fit, seen), fit.values)
         return float(np.sqrt(left**2 + self._given_up(fit).left))
 
     def heldout_misfit(self, fit: Fit) -> float | None:
@@ -107,17 +107,20 @@ class FollowedReadings:
         if not self._whiteners:
             return None
         return self._given_up(fit).misfit + sum(
-            float(np.sum(huber(white(item.values - told))))
-            for item, white, told in zip(
-                self._plant.heldout, self._whiteners, self._told_by_all(fit, self._plant.heldout), strict=True
+            float(np.sum(huber(white(item.values - predicted))))
+            for item, white, predicted in zip(
+                self._plant.heldout,
+                self._whiteners,
+                self._predicted_by_all(fit, self._plant.heldout),
+                strict=True,
             )
         )
 
-    def _told_by_all(self, fit: Fit, seen: Sequence[Observation]) -> list[Array]:
+    def _predicted_by_all(self, fit: Fit, seen: Sequence[Observation]) -> list[Array]:
         """Predicted readings with states and moments that follow all readings."""
         followed = self.followed(fit)
-        told = self._told(followed.fit)
-        return [item.at(told[item.recording][:, item.channel]) for item in seen]
+        predicted = self._predicted(followed.fit)
+        return [item.at(predicted[item.recording][:, item.channel]) for item in seen]
 
     def followed(self, fit: Fit) -> Followed:
         """The fit with states and moments that all readings tell, held-out ones included.
@@ -161,7 +164,7 @@ class FollowedReadings:
         held = self._plant.heldout
         if not held:
             return 0.0
-        error = error_over_noise(held, self._told_by_all(fit, held))
+        error = error_over_noise(held, self._predicted_by_all(fit, held))
         return float(np.sqrt(error + self._given_up(fit).error))
 
     def _given_up(self, fit: Fit) -> GivenUp:
@@ -175,16 +178,16 @@ class FollowedReadings:
         return self._given[id(fit)][1]
 
     def _of(self, fit: Fit) -> list[Array]:
-        told = self._told(fit)
-        return [item.at(told[item.recording][:, item.channel]) for item in self._plant.observations]
+        predicted = self._predicted(fit)
+        return [item.at(predicted[item.recording][:, item.channel]) for item in self._plant.observations]
 
-    def _told(self, fit: Fit) -> list[Array]:
+    def _predicted(self, fit: Fit) -> list[Array]:
         if id(fit) not in self._known:
             plant = self._plant if fit.candidates else self._unchanged
-            told = [
+            predicted = [
                 plant.predict(number, fit.values, fit.candidates).temperature
                 for number in range(len(self._plant.recordings))
             ]
             # The fit is kept so that no other takes its identity.
-            self._known[id(fit)] = fit, told
+            self._known[id(fit)] = fit, predicted
         return self._known[id(fit)][1]

@@ -136,12 +136,12 @@ def answer(
     chosen = [(c, i) for i, c in enumerate(fit.coordinates) if not c.name.startswith(OF_ONE_RECORDING)]
     names = [c.name for c, _ in chosen]
     values = {name: value for name, value in fit.values.items() if not name.startswith(OF_ONE_RECORDING)}
-    told = own.predict(0, values, fit.candidates, names)
-    readings, slopes = [told.temperature], [told.sensitivity]
+    predicted = own.predict(0, values, fit.candidates, names)
+    readings, slopes = [predicted.temperature], [predicted.sensitivity]
     if places:
         means = np.array([_weights(predictor, place) for place in places])
-        readings.append(told.states @ means.T)
-        slopes.append(told.slopes_at(means))
+        readings.append(predicted.states @ means.T)
+        slopes.append(predicted.slopes_at(means))
     directions = [item for item in predictor.misdescribed if item.coordinate in values]
     if directions:
         changes = [] if known is None else known
@@ -159,7 +159,7 @@ def answer(
     times = times[times <= grid[-1]]
     whole = np.concatenate(readings, axis=1)
     by = np.concatenate(slopes, axis=1) * np.array([c.sigma for c, _ in chosen])
-    displaced = slice(predictor.recordings[0].temperature_count, told.temperature.shape[1])
+    displaced = slice(predictor.recordings[0].temperature_count, predicted.temperature.shape[1])
     for values in (whole, by):
         values[:, displaced] -= values[0, displaced].copy()
     full = np.zeros((len(times), whole.shape[1], len(fit.coordinates)))

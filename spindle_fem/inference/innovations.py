@@ -100,9 +100,9 @@ class InnovationFilter:
         diagonal = np.arange(errors.start, errors.stop)
         self.covariance[diagonal, diagonal] += self.slow_sigma**2 * (1.0 - kept**2)
         read = np.flatnonzero(np.isfinite(residual))
-        told = np.full(len(residual), np.nan)
+        scaled = np.full(len(residual), np.nan)
         if not read.size:
-            return told
+            return scaled
         observes = np.zeros((read.size, len(self.mean)))
         observes[:, :own] = slopes[read]
         observes[np.arange(read.size), own + read] = 1.0
@@ -118,14 +118,14 @@ class InnovationFilter:
         spread = observes @ across + noise
         innovation = residual[read] - observes @ self.mean
         sigma = np.sqrt(np.diag(spread))
-        told[read] = np.where(fresh, np.nan, innovation / sigma)
+        scaled[read] = np.where(fresh, np.nan, innovation / sigma)
         gain = np.linalg.solve(spread, across.T).T
         if not learn:
             gain[:own] = 0.0
         self.mean += gain @ np.clip(innovation, -OUTLIER * sigma, OUTLIER * sigma)
         left = np.eye(len(self.mean)) - gain @ observes
         self.covariance = left @ self.covariance @ left.T + gain @ noise @ gain.T
-        return told
+        return scaled
 
     def moved(self) -> Array:
         """Departures of the coordinates, (p,), which count from there afterwards."""

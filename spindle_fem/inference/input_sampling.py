@@ -71,7 +71,7 @@ def own_times(network: ThermalNetwork) -> Array:
 def left_over_noise(
     predictor: Predictor,
     observations: Sequence[Observation],
-    told: Sequence[Array],
+    predicted: Sequence[Array],
     factors: Mapping[str, float],
 ) -> float:
     """Robust root mean square of single residuals over their noise, all temperatures weighted equally.
@@ -81,7 +81,7 @@ def left_over_noise(
 
     Parameters
     ----------
-    told : sequence of (b,) ndarray, [K]
+    predicted : sequence of (b,) ndarray, [K]
         At the bins of every observation.
     factors : mapping of str to float
         Fitted factors of a network's parameters.
@@ -91,7 +91,7 @@ def left_over_noise(
         network = predictor.fast.inputs.moved(factors)
         beside = [sampling_errors(network, power) for power in predictor.unseen]
     ratios = []
-    for item, values in zip(observations, told, strict=True):
+    for item, values in zip(observations, predicted, strict=True):
         if item.bins.is_relative:
             continue
         recording = predictor.recordings[item.recording]
@@ -110,16 +110,16 @@ def left_over_noise(
     return float(np.sqrt(np.mean(ratios)))
 
 
-def error_over_noise(observations: Sequence[Observation], told: Sequence[Array]) -> float:
+def error_over_noise(observations: Sequence[Observation], predicted: Sequence[Array]) -> float:
     """Mean square of residuals of means over bins over the white noise left in them, channels alike.
 
     Parameters
     ----------
-    told : sequence of (b,) ndarray, [K]
+    predicted : sequence of (b,) ndarray, [K]
         At the bins of every observation.
     """
     errors = [
         np.mean((values - item.values) ** 2) / item.bins.white**2
-        for item, values in zip(observations, told, strict=True)
+        for item, values in zip(observations, predicted, strict=True)
     ]
     return float(np.mean(errors))

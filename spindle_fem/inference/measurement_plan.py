@@ -73,15 +73,15 @@ class Hypothetical:
     def reported(self, multiple: float) -> tuple[str, float, str]:
         """Parameter, value and unit that a finding states at a multiple of the usual size."""
         candidate = self.main.candidate
-        told, half = (
+        full, half = (
             effect_of(self.effect).report(
                 candidate, self.main.values(amplitude_value(self.main, factor * multiple))
             )
             for factor in (1.0, 0.5)
         )
         # The first that follows the size: of a swing the amplitude, not the period.
-        name = next((n for n, item in told.items() if item.value != half[n].value), next(iter(told)))
-        return name, told[name].value, told[name].unit
+        name = next((n for n, item in full.items() if item.value != half[n].value), next(iter(full)))
+        return name, full[name].value, full[name].unit
 
     def size(self, multiple: float) -> tuple[str, float, str] | None:
         """Size as parameter name, value and unit; None beyond the possible range."""
@@ -101,7 +101,7 @@ class Option:
     ----------
     information : float
         Mean over all pairs, bits.
-    seen, told : int
+    seen, separated : int
         Effects seen at their usual size, and those of them distinguishable from every other.
     """
 
@@ -109,7 +109,7 @@ class Option:
     words: str
     information: float
     seen: int
-    told: int
+    separated: int
     detail: str = ""
 
 
@@ -209,9 +209,9 @@ def plan_measurement(
     comparable = comparable_pairs(hypotheticals, machine.view)
 
     def judged(own: ChannelProducts, channels: Sequence[int], name: str, words: str, detail: str) -> Option:
-        told = forms.judged(own.gram(channels))
-        seen, apart = told.seen_from <= 1.0, (told.told_from <= 1.0) | ~comparable
-        information = told.mean_information(weights, NOTHING)
+        separation = forms.judged(own.gram(channels))
+        seen, apart = separation.seen_from <= 1.0, (separation.told_from <= 1.0) | ~comparable
+        information = separation.mean_information(weights, NOTHING)
         return Option(
             name, words, information, int(seen.sum()), int((seen & apart.all(axis=1)).sum()), detail
         )
@@ -331,9 +331,9 @@ def _products(
     predictor, belief = problem.predictor, problem.belief
     means, read = _means(predictor, places), len(predictor.columns[number])
     values = {c.name: c.at(u) for c, u in zip(belief.coordinates, belief.mean, strict=True)}
-    told = predictor.predict(number, values, (), [c.name for c in belief.coordinates])
+    predicted = predictor.predict(number, values, (), [c.name for c in belief.coordinates])
     scale = np.array([c.sigma for c in belief.coordinates])
-    slopes = np.concatenate((told.sensitivity, told.slopes_at(means)), axis=1)
+    slopes = np.concatenate((predicted.sensitivity, predicted.slopes_at(means)), axis=1)
     for index, coordinate in enumerate(belief.coordinates):
         if coordinate.name in moved:
             slopes[:, read:, index] += moved[coordinate.name]

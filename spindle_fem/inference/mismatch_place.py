@@ -142,8 +142,8 @@ def where_of(diagnosis: Diagnosis) -> Where:
     if diagnosis.judgement.verdict == "consistent":
         return Where("", np.nan, np.nan, (), {}, {}, {}, ())
     view, candidates = diagnosis.view, diagnosis.final.candidates
-    told, spots = component_shares(diagnosis.explanations, view.reported)
-    ranked = sorted(told, key=lambda name: -told[name])
+    by_component, spots = component_shares(diagnosis.explanations, view.reported)
+    ranked = sorted(by_component, key=lambda name: -by_component[name])
     component = main_component(diagnosis) or (ranked[0] if ranked else "")
     named = list(dict.fromkeys((component, *(c.component for c in candidates)) if component else ()))
     credible = list(named)
@@ -152,7 +152,7 @@ def where_of(diagnosis: Diagnosis) -> Where:
     for name in ranked:
         if covered >= CREDIBLE:
             break
-        covered += told[name]
+        covered += by_component[name]
         if name not in credible:
             credible.append(name)
     # A sensor's reading is wrong without any heat.
@@ -178,7 +178,9 @@ def where_of(diagnosis: Diagnosis) -> Where:
     condition = heat_condition(diagnosis.explanations, spot, diagnosis.predictor) or (
         longest.condition if longest else ""
     )
-    return Where(component, radius, axial, tuple(credible), told, spots, heat, when, stamps, condition)
+    return Where(
+        component, radius, axial, tuple(credible), by_component, spots, heat, when, stamps, condition
+    )
 
 
 def _centre(diagnosis: Diagnosis, component: str) -> tuple[float, float]:
@@ -226,14 +228,14 @@ def component_shares(
     if not evidence:
         return {}, {}
     weighed = {spot: counted(gain) / tuned.GAIN_DIVISOR for spot, gain in evidence.items()}
-    told: dict[str, float] = {}
+    by_component: dict[str, float] = {}
     spots: dict[str, str] = {}
     for spot, share in shares(weighed).items():
         component = reported.get(spot, spot)
-        told[component] = told.get(component, 0.0) + share
+        by_component[component] = by_component.get(component, 0.0) + share
         if component not in spots or evidence[spot] > evidence[spots[component]]:
             spots[component] = spot
-    return told, spots
+    return by_component, spots
 
 
 def missing_heat(explanations: Sequence[Explanation], spot: str, predictor: Predictor) -> MissingHeat:
@@ -276,8 +278,8 @@ def heat_condition(explanations: Sequence[Explanation], spot: str, predictor: Pr
             if mask.any():
                 longest = duration
                 limit = separating_temperature(recording, mask)
-                told = _words(operating_conditions(recording), mask)
-                words = ", ".join(part for part in (told, limit) if part)
+                condition_words = _words(operating_conditions(recording), mask)
+                words = ", ".join(part for part in (condition_words, limit) if part)
     return words
 
 

@@ -282,9 +282,9 @@ def _option(
 ) -> Option:
     means, covariances = [], []
     size = len(answers[0].times)
-    for told, fit in zip(answers, fits, strict=True):
-        means.append(told.readings[:, chosen].T.ravel())
-        slopes = told.slopes[:, chosen].transpose(1, 0, 2).reshape(size * len(chosen), -1)
+    for expected, fit in zip(answers, fits, strict=True):
+        means.append(expected.readings[:, chosen].T.ravel())
+        slopes = expected.slopes[:, chosen].transpose(1, 0, 2).reshape(size * len(chosen), -1)
         covariance = slopes @ fit.covariance @ slopes.T
         for position, channel in enumerate(chosen):
             own = slice(position * size, (position + 1) * size)

@@ -84,7 +84,7 @@ def plan_content(
         if best_sensor is None
         else {"name": best_sensor.name, "place": best_sensor.words},
         "best_test": None if best_test is None else {"description": best_test.name, "length_s": compared},
-        "told": {"effects": len(items), "seen": plan.asked.seen, "told_from_all": plan.asked.told},
+        "told": {"effects": len(items), "seen": plan.asked.seen, "told_from_all": plan.asked.separated},
         "expected_information_bit": plan.asked.information,
         "further_sensors": [_option(item, plan.asked) for item in plan.further_sensors],
         "sensors_in_turn": [_option(item, plan.asked) for item in plan.sensors_in_turn],
@@ -131,7 +131,7 @@ def _option(item: Option, now: Option) -> dict[str, Any]:
         "information_bit": item.information,
         "gain_bit": item.information - now.information,
         "seen": item.seen,
-        "told_from_all": item.told,
+        "told_from_all": item.separated,
     }
 
 
@@ -154,7 +154,7 @@ def summary(plan: MeasurementPlan, sensors: Sequence[Sensor], compared: float) -
     shown = ", ".join(names[:-1]) + f" and {names[-1]}" if len(names) > 1 else names[0]
     found = [
         f"With {shown}, this test shows {now.seen} of {len(items)} effects at their usual size, and tells "
-        f"{now.told} of these from every other effect."
+        f"{now.separated} of these from every other effect."
     ]
     seen = [i for i in range(len(items)) if plan.separation.seen_from[i] <= 1.0]
     doubtful = sorted(
@@ -169,8 +169,8 @@ def summary(plan: MeasurementPlan, sensors: Sequence[Sensor], compared: float) -
         best = plan.sensors_in_turn[0]
         if best.information - now.information >= WORTH:
             found.append(
-                f"The sensor to add: {best.words}. With it {best.seen} effects are seen and {best.told} told "
-                "from every other."
+                f"The sensor to add: {best.words}. With it {best.seen} effects are seen and "
+                f"{best.separated} told from every other."
             )
         else:
             found.append("No further sensor would tell much more in this test.")
@@ -180,7 +180,7 @@ def summary(plan: MeasurementPlan, sensors: Sequence[Sensor], compared: float) -
             found.append(
                 f"A test that tells more with the same sensors: {best.name}: on the mean of all pairs "
                 f"{best.information:.2f} bit instead of {now.information:.2f}; {best.seen} effects are seen, "
-                f"{best.told} told from every other."
+                f"{best.separated} told from every other."
             )
         else:
             found.append(f"No other test of {compared / 3600.0:.3g} h tells more with these sensors.")

@@ -312,8 +312,8 @@ def as_predicted(machine: DiagnosedMachine, recordings: Sequence[Recording]) -> 
     predictor = Predictor(machine.fast, machine.recordings, effects=machine.effects)
     found = []
     for number, recording in enumerate(recordings):
-        told = predictor.predict(number, {}).temperature
+        predicted = predictor.predict(number, {}).temperature
         grid = predictor.drives[number].times
-        readings = [np.interp(recording.times, grid, column) for column in told.T]
+        readings = [np.interp(recording.times, grid, column) for column in predicted.T]
         found.append(replace(recording, temperature=np.array(readings).T))
     return found

@@ -364,17 +364,17 @@ class Predictor:
         temperature = found.temperature[:, columns]
         sensitivity = np.zeros((*temperature.shape, len(derivatives)))
         sensitivity[:, :, owners >= 0] = found.sensitivity[:, columns][:, :, owners[owners >= 0]]
-        told = Prediction(temperature, sensitivity, found.states, run, found.tangents, owners)
-        self._displace(number, told, values, derivatives)
-        self._unseen(number, told, values, derivatives)
+        predicted = Prediction(temperature, sensitivity, found.states, run, found.tangents, owners)
+        self._displace(number, predicted, values, derivatives)
+        self._unseen(number, predicted, values, derivatives)
         for reading in self.effects.readings:
-            self._read(number, reading, told, {}, ())
+            self._read(number, reading, predicted, {}, ())
         for reading in _readings(acting):
-            self._read(number, reading, told, values, derivatives)
-        return told
+            self._read(number, reading, predicted, values, derivatives)
+        return predicted
 
     def _displace(
-        self, number: int, told: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
+        self, number: int, predicted: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
     ) -> None:
         """Read each probe where it sits, to first order in its displacement, in place."""
         model, probes = self.fast.model, self.recordings[number].probes
@@ -383,33 +383,34 @@ class Predictor:
             if probe not in probes:
                 continue
             gradient = model.probe_gradients[model.probe_names.index(probe), DIRECTIONS.index(direction)]
-            slope = told.states @ gradient
+            slope = predicted.states @ gradient
             column = probes.index(probe)
-            told.temperature[:, column] += values.get(name, 0.0) * slope
+            predicted.temperature[:, column] += values.get(name, 0.0) * slope
             if name in derivatives:
-                told.sensitivity[:, column, derivatives.index(name)] += slope
+                predicted.sensitivity[:, column, derivatives.index(name)] += slope
 
     def _unseen(
-        self, number: int, told: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
+        self, number: int, predicted: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
     ) -> None:
         """Add first-order changes by events in gaps and deviations of the machine, in place."""
         known, slopes = self.directions_of(number)
         if known:
             by = np.array([values.get(name, 0.0) for name in known])
             # Of one matrix: there may be hundreds of directions.
-            told.temperature[:] += (slopes.reshape(-1, len(known)) @ by).reshape(told.temperature.shape)
+            change = slopes.reshape(-1, len(known)) @ by
+            predicted.temperature[:] += change.reshape(predicted.temperature.shape)
             asked = [k for k, name in enumerate(known) if name in derivatives]
             places = [derivatives.index(known[k]) for k in asked]
-            told.sensitivity[:, :, places] += slopes[:, :, asked]
+            predicted.sensitivity[:, :, places] += slopes[:, :, asked]
         for kind, open_ones in ((JUMP_PREFIX, self._jumps[number]), (GAP_PREFIX, self._hidden[number])):
             if not open_ones:
                 continue
             prefix = f"{kind}{number}."
             for name in {name for name in (*values, *derivatives) if name.startswith(prefix)}:
                 slope = self._slopes_of(kind, number)[:, :, int(name.removeprefix(prefix))]
-                told.temperature[:] += values.get(name, 0.0) * slope
+                predicted.temperature[:] += values.get(name, 0.0) * slope
                 if name in derivatives:
-                    told.sensitivity[:, :, derivatives.index(name)] += slope
+                    predicted.sensitivity[:, :, derivatives.index(name)] += slope
 
     def directions_of(self, number: int) -> tuple[list[str], Array]:
         """Coordinates of directions that do something in a recording, and what they do, (G + 1, c, k) K."""
@@ -438,16 +439,16 @@ class Predictor:
         self, number: int, candidates: Sequence[Candidate], values: Mapping[str, float], temperature: Array
     ) -> Array:
         """Readings of the channels if their places have the temperatures (G + 1, c)."""
-        told = Prediction(temperature.copy(), np.zeros((*temperature.shape, 0)), np.zeros(0))
+        predicted = Prediction(temperature.copy(), np.zeros((*temperature.shape, 0)), np.zeros(0))
         for reading in _readings(candidates):
-            self._read(number, reading, told, values, ())
-        return told.temperature
+            self._read(number, reading, predicted, values, ())
+        return predicted.temperature
 
     def _read(
         self,
         number: int,
         reading: Reading,
-        told: Prediction,
+        predicted: Prediction,
         values: Mapping[str, float],
         derivatives: Sequence[str],
     ) -> None:
@@ -458,15 +459,16 @@ class Predictor:
         column, drive = names.index(reading.channel), self.drives[number]
         own = {f"{reading.name}.{item.name}": item.name for item in reading.parameters}
         asked = {own[name]: position for position, name in enumerate(derivatives) if name in own}
-        told.temperature[:, column], told.sensitivity[:, column], by = reading.read_with_derivatives(
+        shown, slopes, by = reading.read_with_derivatives(
             drive.times,
-            told.temperature[:, column],
-            told.sensitivity[:, column],
+            predicted.temperature[:, column],
+            predicted.sensitivity[:, column],
             inputs_at(drive, drive.times),
             {inner: values[outer] for outer, inner in own.items() if outer in values},
             tuple(asked),
         )
-        told.sensitivity[:, column, list(asked.values())] += by
+        predicted.temperature[:, column], predicted.sensitivity[:, column] = shown, slopes
+        predicted.sensitivity[:, column, list(asked.values())] += by
 
 
 def _readings(candidates: Sequence[Candidate]) -> list[Reading]:

@@ -203,10 +203,10 @@ def with_own_noise(
     together = [
         (own[0][0], np.column_stack([values for _, values in own])) for own in zip(*left, strict=True)
     ]
-    told = slow_errors_of(together, size=huber, **choices)
+    slow_errors = slow_errors_of(together, size=huber, **choices)
     return [
         replace(item, deviance=deviance + fit.misfit_with_prior - fit.misfit)
-        for item, fit, (_, deviance) in zip(hypotheses, fits, told, strict=True)
+        for item, fit, (_, deviance) in zip(hypotheses, fits, slow_errors, strict=True)
     ]
 
 

@@ -299,8 +299,8 @@ def slow_errors_of(
                 if key is COMMON or key >= 0:
                     row[place] += (np.log(slow.sigma / prior.of(key).sigma) / prior_width) ** 2
     best, least = found.argmin(axis=0), found.min(axis=0).sum(axis=0)
-    told = [_joined({key: choices[best[i, fit]] for i, key in enumerate(keys)}) for fit in range(fits)]
-    return list(zip(told, least.tolist(), strict=True))
+    errors = [_joined({key: choices[best[i, fit]] for i, key in enumerate(keys)}) for fit in range(fits)]
+    return list(zip(errors, least.tolist(), strict=True))
 
 
 def _joined(chosen: Mapping[int | None, SlowError]) -> SlowError:

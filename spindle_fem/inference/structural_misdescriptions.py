@@ -44,8 +44,8 @@ def structural_columns(base: BaseRun) -> dict[str, Array]:
     model = model_with_directions(base.predictor.fast)
     names = tuple(item.name for item in model.structural)
     own = base.predictor.with_model(model)
-    told = own.predict(base.number, base.values, base.candidates, names)
-    return {name: told.sensitivity[:, :, column] for column, name in enumerate(names)}
+    predicted = own.predict(base.number, base.values, base.candidates, names)
+    return {name: predicted.sensitivity[:, :, column] for column, name in enumerate(names)}
 
 
 def structural_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:

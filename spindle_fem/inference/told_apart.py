@@ -256,5 +256,5 @@ class Separation:
         """
         beside = np.outer(weights, weights) * (1.0 - np.eye(len(weights)))
         total = nothing * float(weights.sum()) + float(beside.sum())
-        told = nothing * float(weights @ self.information_seen) + float(np.sum(beside * self.information))
-        return told / total
+        seen, apart = weights @ self.information_seen, np.sum(beside * self.information)
+        return (nothing * float(seen) + float(apart)) / total

@@ -34,13 +34,13 @@ def unseen_moments(predictor: Predictor, fit: Fit) -> dict[str, float]:
     for candidate, name in _moments(fit):
         number = candidate.recording or 0
         held = stretches(~predictor.use[number], predictor.recordings[number].times)
-        told = _Told(predictor, fit, fit.values | found, name)
-        best = told.moment
-        for begin, end in _beside(held, told.moment):
-            inside = begin <= told.moment <= end
-            if inside or told.cost_at(min(max(told.moment, begin), end)) < told.cost + FLAT:
-                best = min(best, told.best_within(begin, end), key=told.cost_at)
-        if best != told.moment:
+        misfit = _MomentMisfit(predictor, fit, fit.values | found, name)
+        best = misfit.moment
+        for begin, end in _beside(held, misfit.moment):
+            inside = begin <= misfit.moment <= end
+            if inside or misfit.cost_at(min(max(misfit.moment, begin), end)) < misfit.cost + FLAT:
+                best = min(best, misfit.best_within(begin, end), key=misfit.cost_at)
+        if best != misfit.moment:
             found[name] = best
     return found
 
@@ -57,7 +57,7 @@ def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
         slopes = {n: s for n, s in predictor.unread_within(number, held).items() if n in known}
         if not slopes:
             continue
-        told = predictor.predict(number, fit.values, fit.candidates).temperature
+        predicted = predictor.predict(number, fit.values, fit.candidates).temperature
         matrix, rest = [], []
         for item in (*predictor.observations, *predictor.heldout):
             # The constant of a displacement is free: temperatures tell.
@@ -65,7 +65,7 @@ def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
                 noise = np.hypot(item.bins.white, fit.slow.sigma)
                 own = np.column_stack([slope[:, item.channel] for slope in slopes.values()])
                 matrix.append(item.at(own) / noise)
-                rest.append((item.values - item.at(told[:, item.channel])) / noise)
+                rest.append((item.values - item.at(predicted[:, item.channel])) / noise)
         coordinates = [known[name][0] for name in slopes]
         now = np.array([known[name][1] for name in slopes])
         columns = np.vstack(matrix) * np.array([c.sigma for c in coordinates])
@@ -95,7 +95,7 @@ def _moments(fit: Fit) -> Iterator[tuple[Candidate, str]]:
                 yield candidate, name
 
 
-class _Told:
+class _MomentMisfit:
     """Misfit of all readings over one moment."""
 
     def __init__(self, predictor: Predictor, fit: Fit, values: Mapping[str, float], name: str) -> None:
@@ -113,7 +113,7 @@ class _Told:
     def _cost(self, moment: float) -> float:
         predictor, values = self._predictor, {**self._values, self._name: moment}
         try:
-            told = [
+            predicted = [
                 predictor.predict(number, values, self._fit.candidates).temperature
                 for number in range(len(predictor.recordings))
             ]
@@ -122,7 +122,9 @@ class _Told:
         return sum(
             float(
                 np.sum(
-                    huber((item.at(told[item.recording][:, item.channel]) - item.values) / item.bins.white)
+                    huber(
+                        (item.at(predicted[item.recording][:, item.channel]) - item.values) / item.bins.white
+                    )
                 )
             )
             for item in (*predictor.observations, *predictor.heldout)

@@ -45,7 +45,7 @@ REMEMBERED = 300
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Judgement:
     """State of the machine at one instant.
 
     Attributes
@@ -168,7 +168,7 @@ class WatchedMachine:
         self._begin(piece)
         self.run.follow(piece, self._values, [c.name for c in self.coordinates], self.width)
 
-    def follow(self, recording: Recording, *, to_end: bool = False) -> list[Told]:
+    def follow(self, recording: Recording, *, to_end: bool = False) -> list[Judgement]:
         """Follow the rows of a recording that are new, as far as whole averages go.
 
         Parameters
@@ -180,10 +180,10 @@ class WatchedMachine:
 
         Returns
         -------
-        list of Told
+        list of Judgement
             One an instant.
         """
-        found: list[Told] = []
+        found: list[Judgement] = []
         times = recording.times
         if not np.isfinite(self.used):
             self.used = float(times[0])
@@ -210,11 +210,11 @@ class WatchedMachine:
             found += self._piece(piece_of(recording, begin, stop))
             self.used = float(times[stop - 1])
 
-    def _piece(self, piece: Recording) -> list[Told]:
+    def _piece(self, piece: Recording) -> list[Judgement]:
         names = [c.name for c in self.coordinates]
-        told, observations = self.run.follow(piece, self._values, names, self.width)
+        predicted, observations = self.run.follow(piece, self._values, names, self.width)
         sigma = np.array([c.sigma for c in self.coordinates])
-        instants = _Instants.of(piece, observations, told, sigma, self.width)
+        instants = _Instants.of(piece, observations, predicted, sigma, self.width)
         self._channels = piece.temperature_names
         if np.diff(piece.times).max() > self._gap:
             # The history of a machine with geometry during the gap is unknown until it has faded.
@@ -244,7 +244,7 @@ class WatchedMachine:
         self._recentre(float(piece.times[-1] - piece.times[0]))
         return found
 
-    def _judge(self, time: float, condition: str) -> Told:
+    def _judge(self, time: float, condition: str) -> Judgement:
         evidence, out = (
             self.sums.evidence,
             np.abs(self._filter.slow_errors) > STILL_OUT * self._filter.slow_sigma,
@@ -257,7 +257,7 @@ class WatchedMachine:
             self.state = LEAVING if self.sums.rising.any() else AS_MODELLED
         worst = int(np.argmax(evidence))
         away = self.state != AS_MODELLED
-        return Told(
+        return Judgement(
             time,
             self.state,
             self._channels[worst] if away else None,
@@ -331,7 +331,7 @@ class _Instants:
         cls,
         piece: Recording,
         observations: Sequence[Observation],
-        told: Prediction,
+        predicted: Prediction,
         sigma: Array,
         width: float,
     ) -> _Instants:
@@ -344,9 +344,9 @@ class _Instants:
         slopes, expected = np.zeros((*residual.shape, sigma.size)), np.full_like(residual, np.nan)
         for item, owner in zip(observations, owners, strict=True):
             rows, channel = np.searchsorted(known, owner), item.channel
-            expected[rows, channel] = item.at(told.temperature[:, channel])
+            expected[rows, channel] = item.at(predicted.temperature[:, channel])
             residual[rows, channel] = item.values - expected[rows, channel]
-            slopes[rows, channel] = item.at(told.sensitivity[:, channel]) * sigma
+            slopes[rows, channel] = item.at(predicted.sensitivity[:, channel]) * sigma
             number[rows, channel], times[rows, channel] = item.bins.number, item.bins.times
         mean = np.nanmean(times, axis=1)
         warm = np.isfinite(expected[:, : piece.temperature_count])

@@ -230,7 +230,7 @@ def _heat(diagnosis: Diagnosis) -> dict[str, Any]:
         return {}
     spots = list(dict.fromkeys(item.spot for item in tracks))
     evidence = {spot: sum(t.log_evidence for t in tracks if t.spot == spot) for spot in spots}
-    told, _ = component_shares(tracks, {})
+    shares, _ = component_shares(tracks, {})
     reported = diagnosis.view.reported
     watts = {"units": "W"}
     return {
@@ -248,7 +248,7 @@ def _heat(diagnosis: Diagnosis) -> dict[str, Any]:
         "spot_log_evidence": ("spot", np.array([evidence[spot] for spot in spots])),
         "spot_share": (
             "spot",
-            np.array([told[spot] for spot in spots]),
+            np.array([shares[spot] for spot in spots]),
             {"long_name": "probability that heat is missing here, if at one place"},
         ),
     }

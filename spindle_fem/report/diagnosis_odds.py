@@ -165,7 +165,7 @@ def machine_parameters(data: xr.Dataset) -> Figure | None:
     )
     notes = "Value and 90 % interval; the prior holds a shift beyond the grey band with less than 10 %."
     if left_out:
-        notes += f" {left_out} more stayed as they were, or were told less."
+        notes += f" {left_out} more stayed as they were, or moved less."
     set_title(figure, "The machine's own parameters", notes)
     return figure
 

@@ -68,8 +68,8 @@ def fit_table(content: Mapping[str, Any]) -> Table:
 
 def misdescription_blocks(content: Mapping[str, Any]) -> list[Table | Text]:
     """Possible deviations of the machine from its definition: the largest, and what to measure."""
-    told = content.get("misdescription") or {}
-    if not told.get("directions"):
+    deviations = content.get("misdescription") or {}
+    if not deviations.get("directions"):
         return []
     blocks: list[Table | Text] = []
     captions = {
@@ -77,9 +77,9 @@ def misdescription_blocks(content: Mapping[str, Any]) -> list[Table | Text]:
         "left_open": f"As fitted with {found_words(content)}:" if content["findings"] else "As fitted:",
     }
     for key, caption in captions.items():
-        if told.get(key):
+        if deviations.get(key):
             fields = (
-                *recording_fields(told[key]),
+                *recording_fields(deviations[key]),
                 words("key of the definition", "key"),
                 words("what", "statement"),
                 rounded("value", "value"),
@@ -90,8 +90,8 @@ def misdescription_blocks(content: Mapping[str, Any]) -> list[Table | Text]:
                 words("moves a channel by up to", _largest),
                 words("channel", "channel"),
             )
-            blocks.append(table_of(fields, told[key], caption))
-    if measure := told.get("measure"):
+            blocks.append(table_of(fields, deviations[key], caption))
+    if measure := deviations.get("measure"):
         amount = f"{significant(measure['expected'])} {measure['unit']}".strip()
         blocks.append(
             Text(

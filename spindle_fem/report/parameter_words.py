@@ -42,13 +42,13 @@ def parameter_words(name: str, recordings: Sequence[str] = ()) -> str:
     for prefix in (JUMP_PREFIX, GAP_PREFIX, MISDESCRIBED_IN_PREFIX, START_PREFIX):
         if name.startswith(prefix):
             number, _, rest = name.removeprefix(prefix).partition(".")
-            told = {
+            text = {
                 JUMP_PREFIX: lambda key: f"instant of change {int(key) + 1} of an input between rows",
                 GAP_PREFIX: lambda key: f"heat or inlet in stretch {int(key) + 1} between rows",
                 START_PREFIX: lambda key: f"{_plain(key.removeprefix('initial.'))} at the start",
                 MISDESCRIBED_IN_PREFIX: lambda key: f"recording: {_plain(key)}",
             }[prefix](rest)
-            return f"{told} ({recordings[int(number)]})" if len(recordings) > 1 else told
+            return f"{text} ({recordings[int(number)]})" if len(recordings) > 1 else text
     if name.startswith(PROBE_PREFIX):
         probe, _, direction = name.removeprefix(PROBE_PREFIX).rpartition(".")
         return f"place of probe {probe} {ALONG.get(direction, direction)}"

@@ -88,11 +88,11 @@ def _summary(content: Mapping[str, Any]) -> list[Any]:
 
 
 def _cards(content: Mapping[str, Any]) -> list[dict[str, str]]:
-    told = content["told"]
+    counts = content["told"]
     return [
-        {"value": str(told["effects"]), "name": "effects at places were tried"},
-        {"value": str(told["seen"]), "name": "are seen at their usual size"},
-        {"value": str(told["told_from_all"]), "name": "of these are told from every other"},
+        {"value": str(counts["effects"]), "name": "effects at places were tried"},
+        {"value": str(counts["seen"]), "name": "are seen at their usual size"},
+        {"value": str(counts["told_from_all"]), "name": "of these are told from every other"},
         {"value": f"{number(content['expected_information_bit'], 2)} bit", "name": "mean over all pairs"},
     ]
 

@@ -241,8 +241,8 @@ def _sections(
         ]
         sections.append(Section("sensitivity", "What matters", [pictures["sensitivities"], Bullets(said)]))
     if films:
-        told = sweep_film.film_words(films, pump_limits(summary["constraints"]))
-        blocks = [*told, pictures["film_maps"], pictures["pump_maps"]]
+        film_blocks = sweep_film.film_words(films, pump_limits(summary["constraints"]))
+        blocks = [*film_blocks, pictures["film_maps"], pictures["pump_maps"]]
         sections.append(Section("film", "The paper's choice of depth and coolant temperature", blocks))
     sections.append(Section("table", "All designs", _table(rows, parameters, outputs)))
     packages = (words("package", itemgetter(0)), words("version", itemgetter(1)))

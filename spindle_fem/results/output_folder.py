@@ -183,9 +183,9 @@ def reading_results(folder: str | Path) -> Iterator[None]:
 
 
 def _damaged(folder: str | Path, error: Exception) -> BadInputError:
-    told = " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_QUOTED]
+    cause = " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_QUOTED]
     return BadInputError(
-        str(folder), f"holds a file that was damaged or changed ({told}).", "Run the command again."
+        str(folder), f"holds a file that was damaged or changed ({cause}).", "Run the command again."
     )
 
 

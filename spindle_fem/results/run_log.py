@@ -43,8 +43,8 @@ def logged_in(folder: Path) -> Iterator[None]:
     try:
         yield
     except BaseException as error:
-        told = isinstance(error, (SpindleFemError, KeyboardInterrupt))
-        LOGGER.error("not finished: %s: %s", type(error).__name__, error, exc_info=not told)
+        expected = isinstance(error, (SpindleFemError, KeyboardInterrupt))
+        LOGGER.error("not finished: %s: %s", type(error).__name__, error, exc_info=not expected)
         raise
     else:
         LOGGER.info("done after %.1f s", time.perf_counter() - started)

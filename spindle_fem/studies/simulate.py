@@ -113,8 +113,8 @@ def _simulate_geometry(
     if followed.follows_preload:
         fast, error = with_followed_preload(followed, fast, recordings, effects, progress=progress)
     if calibration:
-        told = [with_displacements(item) for item in calibration]
-        earlier = Predictor(fast, told, effects=effects, at_stamps=True)
+        earlier_recordings = [with_displacements(item) for item in calibration]
+        earlier = Predictor(fast, earlier_recordings, effects=effects, at_stamps=True)
         result = fit_parameters(earlier, progress=progress)
     drives = (drive_of_recording(spec, recording),)
     predictor = Predictor(fast, [recording], effects=effects, at_stamps=True, drives=drives)
@@ -268,7 +268,7 @@ def _prediction(predictor: Predictor, result: Calibration | None) -> tuple[Array
         for prior in priors
         if not prior.name.startswith(START_PREFIX)
     }
-    told = predictor.predict(0, factors, (), [prior.name for prior in priors])
+    predicted = predictor.predict(0, factors, (), [prior.name for prior in priors])
     covariance = np.diag([prior.sigma_log**2 for prior in priors])
     if result is not None:
         known = {prior.name: i for i, prior in enumerate(result.priors)}
@@ -277,4 +277,4 @@ def _prediction(predictor: Predictor, result: Calibration | None) -> tuple[Array
         covariance[np.ix_(mine, mine)] = result.covariance[np.ix_(theirs, theirs)]
     slow = SlowError() if result is None else result.slow
     white = predictor.recordings[0].sigma
-    return told.temperature, prediction_interval(covariance, slow, told.sensitivity, white)
+    return predicted.temperature, prediction_interval(covariance, slow, predicted.sensitivity, white)

@@ -18,7 +18,7 @@ from spindle_fem.inference.misdescription_columns import misdescriptions_of, wit
 from spindle_fem.inference.opened_machine import open_machine, with_growth
 from spindle_fem.inference.predictor import LONGEST_BIN, STEP, Predictor
 from spindle_fem.inference.prepared_problem import Calibrated, calibrate
-from spindle_fem.inference.watched_machine import MONTH, Told, WatchedMachine, white_noise
+from spindle_fem.inference.watched_machine import MONTH, Judgement, WatchedMachine, white_noise
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.recordings.displaced_readings import with_displacements
@@ -142,14 +142,14 @@ def watch_recording(
         )
     window = RecordingWindow(manifest, data, progress)
     lines = follow_lines(data, to_end=how.until_end, poll=how.poll, tell=progress)
-    watched, told = None, _Teller(how)
+    watched, teller = None, _Teller(how)
     for fresh in lines:
         window.add(fresh)
         if watched is None and _may_begin(window, how.warm_up):
             first = _smooth(window)
             watched = first and _begin(machine, how, first, calibration, progress)
         if watched is not None:
-            yield from told.of(_follow(watched, window), window)
+            yield from teller.of(_follow(watched, window), window)
     last = _smooth(window)
     if watched is None:
         if last is None:
@@ -161,8 +161,8 @@ def watch_recording(
                 str(recording), f"ends after {window.waiting.size} rows.", "Too few to begin a watch."
             )
         watched = _begin(machine, how, last, calibration, progress)
-    yield from told.of(_follow(watched, window, to_end=True), window)
-    yield from told.end(window)
+    yield from teller.of(_follow(watched, window, to_end=True), window)
+    yield from teller.end(window)
 
 
 def _may_begin(window: RecordingWindow, warm_up: float) -> bool:
@@ -217,7 +217,7 @@ def _width(known: Calibrated, first: Recording, is_network: bool) -> float:
     return max(spacing, min(known.slow.time / AVERAGES_A_TIME, LONGEST_BIN) if is_network else STEP)
 
 
-def _follow(watched: WatchedMachine, window: RecordingWindow, *, to_end: bool = False) -> list[Told]:
+def _follow(watched: WatchedMachine, window: RecordingWindow, *, to_end: bool = False) -> list[Judgement]:
     """Follow what has come, if it is enough for an average."""
     waiting = window.waiting
     if not waiting.size or (not to_end and waiting[-1] - max(watched.used, waiting[0]) < watched.width):
@@ -235,12 +235,12 @@ class _Teller:
 
     def __init__(self, how: Watching) -> None:
         self._how = how
-        self._said: Told | None = None
-        self._latest: Told | None = None
+        self._said: Judgement | None = None
+        self._latest: Judgement | None = None
 
-    def of(self, told: Sequence[Told], window: RecordingWindow) -> Iterator[dict[str, Any]]:
+    def of(self, judgements: Sequence[Judgement], window: RecordingWindow) -> Iterator[dict[str, Any]]:
         """Those of some instants that are worth a line."""
-        for item in told:
+        for item in judgements:
             self._latest, said = item, self._said
             if (
                 said is None
@@ -254,7 +254,7 @@ class _Teller:
         if self._latest is not None and self._latest is not self._said:
             yield self._line(self._latest, window)
 
-    def _line(self, item: Told, window: RecordingWindow) -> dict[str, Any]:
+    def _line(self, item: Judgement, window: RecordingWindow) -> dict[str, Any]:
         self._said = item
         away = None if item.departure is None else round(item.departure, 3)
         return {

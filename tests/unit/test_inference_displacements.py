@@ -234,7 +234,7 @@ def test_other_expansion_coefficients_move_displacements_alone(heated):
     predictor = Predictor(opened.fast, with_growth(opened).recordings)
     (direction,) = growth_misdescriptions(predictor)
     base = BaseRun(predictor, 0, {}, ())
-    moved, told = direction.change(base).direct, base.told()
+    moved, told = direction.change(base).direct, base.predicted()
     assert not moved[:, :2].any()
     np.testing.assert_array_equal(moved[:, 2], told[:, 2])
     assert np.ptp(moved[:, 2]) > 10.0

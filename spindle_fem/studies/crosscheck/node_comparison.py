@@ -95,9 +95,9 @@ def compare(
             heat += bypass.get((first, second), 0.0)
         label = f"{names[first]}|{kind if is_film else names[second]}"
         links.append(LinkComparison(label, first, second, kind, heat, fem, surface))
-    told = {(item.first, item.second) for item in links if item.kind == "solid"}
+    listed = {(item.first, item.second) for item in links if item.kind == "solid"}
     for (first, second, kind), (fem, surface) in flows.items():
-        if kind == "solid" and (first, second) not in told:
+        if kind == "solid" and (first, second) not in listed:
             links.append(
                 LinkComparison(f"{names[first]}|{names[second]}", first, second, kind, 0.0, fem, surface)
             )
