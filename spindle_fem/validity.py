@@ -107,6 +107,7 @@ CHANGES_RESULT = (
 _HARMS = (
     "grease_temperature",
     "oil_temperature",
+    "speed_above_catalogue",
     "counter_bearing_unloaded",
     "gross_sliding",
     "contact_pressure",

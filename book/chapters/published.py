@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 from types import ModuleType
 
 import numpy as np
@@ -20,10 +20,12 @@ TITLE = "Published values of bearings, films and coolant channels"
 FILES = {
     "tests/published/test_bearing_hertz_preload.py": "Contact, deflection, preload and stiffness",
     "tests/published/test_bearing_speed.py": "Bearings at speed",
+    "tests/published/test_load_distribution.py": "Load of every ball and roller, and life",
+    "tests/published/test_catalogue_friction.py": "Friction of each kind at a catalogue's reference speeds",
+    "tests/published/test_bearing_catalogue_rows.py": "Bearings that ship against rows of two catalogues",
     "tests/published/test_film_friction.py": "Viscosity, films and friction",
     "tests/published/test_coolant_reference_values.py": "Oil and helical channels",
 }
-DEVIATIONS = ROOT / "tests" / "published" / "bearing_deviations.py"
 
 
 def make(desk: Desk, pictures: Pictures) -> Chapter:
@@ -80,7 +82,7 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
         sections=sections,
         commands=[
             "python -m pytest tests/published",
-            "python tests/published/bearing_deviations.py",
+            "python -m tests.published.bearing_deviations",
             "python -m book --only published",
         ],
         evidence=[
@@ -97,10 +99,7 @@ def make(desk: Desk, pictures: Pictures) -> Chapter:
 
 
 def _deviations() -> ModuleType:
-    found = importlib.util.spec_from_file_location("bearing_deviations", DEVIATIONS)
-    module = importlib.util.module_from_spec(found)
-    found.loader.exec_module(module)
-    return module
+    return importlib.import_module("tests.published.bearing_deviations")
 
 
 def _sources(tests: list, file: str) -> str:

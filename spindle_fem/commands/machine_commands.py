@@ -107,7 +107,7 @@ def check_machine(
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
     from spindle_fem.operation.driven_flow import flow_warnings
-    from spindle_fem.operation.operating_limits import lost_to_air
+    from spindle_fem.operation.operating_limits import lost_to_air, speeds_beyond_catalogues
 
     if picture is not None and picture.suffix != ".png":
         raise SpecError(str(picture), f'"{picture.suffix}" is no format of pictures.', "Allowed: .png.")
@@ -125,6 +125,7 @@ def check_machine(
         from spindle_fem.report.definition_picture import draw_definition
 
         draw_definition(picture, spec)
+    said = (*flow_warnings(spec), *lost_to_air(spec), *speeds_beyond_catalogues(spec, spec.operation.speed))
     assembly = build_assembly(spec)
     groups = group_of_contacts(spec, assembly.joint_names)
 
@@ -156,7 +157,7 @@ def check_machine(
             {"name": item.where, "detail": item.rule} for item in examine_machine(machine, overrides).assumed
         ],
         "warnings": [
-            *({"code": item.code, "text": item.text} for item in (*flow_warnings(spec), *lost_to_air(spec))),
+            *({"code": item.code, "text": item.text} for item in said),
             *({"code": "geometry_note", "text": note} for note in assembly.notes),
         ],
     }

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+from spindle_fem.definition.bearing_types import RollerBearingType
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
 from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.units import ZERO_CELSIUS_K
-from spindle_fem.validity import CodedWarning
+from spindle_fem.validity import CodedWarning, fold_warnings
 
 
 def require_possible_operation(spec: MachineSpec) -> None:
@@ -57,6 +59,31 @@ def lost_to_air(spec: MachineSpec) -> tuple[CodedWarning, ...]:
         'parts. surroundings = "workshop" gives the outer surfaces one.'
     )
     return (CodedWarning("no_heat_to_air", text),)
+
+
+def speeds_beyond_catalogues(spec: MachineSpec, speed: float) -> tuple[CodedWarning, ...]:
+    """Warning of bearings that are faster at a speed [rad/s] than a catalogue allows single ones to be.
+
+    Balls or rollers of another material than the rings' are left out: catalogues allow them more.
+    """
+    found = []
+    rpm = speed * 30.0 / math.pi
+    for group, bearing in spec.bearings:
+        kind = spec.bearing_types[group.type_name(bearing)]
+        rollers = isinstance(kind, RollerBearingType)
+        limits = BEARING_KINDS[kind.kind].attainable_speeds
+        if limits is None or (kind.roller_material if rollers else kind.ball_material) != kind.ring_material:
+            continue
+        lubricant = "grease" if group.lubrication is None else "oil"
+        limit = limits.at(0.0 if rollers else kind.contact_angle, lubricant)
+        reached = 1e3 * kind.pitch * rpm
+        if reached > limit:
+            text = (
+                f"{bearing.name}: speed times pitch diameter is {reached / 1e6:.2f}e6 rpm mm; a catalogue "
+                f"allows single bearings of its kind {limit / 1e6:.2f}e6 in {lubricant} ({limits.source})."
+            )
+            found.append(CodedWarning("speed_above_catalogue", text))
+    return fold_warnings(found, {bearing.name for _, bearing in spec.bearings})
 
 
 def _faults(spec: MachineSpec) -> Iterator[SpecError]:

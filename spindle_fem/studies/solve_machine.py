@@ -16,7 +16,7 @@ from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.circuits import stream_answer
 from spindle_fem.operation.driven_flow import channel_warnings
-from spindle_fem.operation.operating_limits import lost_to_air
+from spindle_fem.operation.operating_limits import lost_to_air, speeds_beyond_catalogues
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.results.thermal_result import (
     BearingResult,
@@ -146,7 +146,11 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         done.append(checks.check_circuits(circuit_mismatch(machine, solution, coupled.loads)))
     if coolant is not None:
         warnings += channel_warnings(spec, coolant.flow, coolant.pressure_drop)
-    warnings += [*lost_to_air(spec), *_omitted_preload(spec, point, coupled, around)]
+    warnings += [
+        *lost_to_air(spec),
+        *speeds_beyond_catalogues(spec, point.speed),
+        *_omitted_preload(spec, point, coupled, around),
+    ]
     for lubricant in _lubricants(spec, bearings):
         done.append(lubricant)
         if not lubricant.passed:

@@ -1,6 +1,6 @@
 """Measured deviation of the bearing model from each published value, as a Markdown table.
 
-Run: ``python tests/published/bearing_deviations.py`` (prints the table of
+Run: ``python -m tests.published.bearing_deviations`` (prints the table of
 ``docs/published_bearing_values.md``). The tests beside it hold the tolerances.
 """
 
@@ -17,11 +17,20 @@ from spindle_fem.physics.bearings.catalogue_friction import static_load_rating
 from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.heat_models.full import rolling_resistance_houpert
-from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment
-from spindle_fem.physics.bearings.heat_models.skf import skf_moment
+from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment, palmgren_roller_moment
+from spindle_fem.physics.bearings.heat_models.skf import skf_moment, skf_roller_moment
 from spindle_fem.physics.bearings.hertz import jones_axial_constant, mean_load_constant
 from spindle_fem.physics.bearings.lubricant_film import film_central_hamrock_dowson, film_groups
 from spindle_fem.physics.bearings.preload import axial_state, unloading_thrust
+from tests.published.test_bearing_catalogue_rows import ULTAGE, balls
+from tests.published.test_catalogue_friction import (
+    GROOVES,
+    OIL_BATH,
+    ROLLERS,
+    groove,
+    reference_heat,
+    rollers,
+)
 
 Row = tuple[str, str, float, float]
 FRONT = BearingGeometry(
@@ -40,7 +49,7 @@ def turn(rpm: float) -> float:
 
 def rows() -> list[Row]:
     """Case, quantity, published or independently recomputed value, value of this model."""
-    return [*static_rows(), *stiffness_rows(), *speed_rows(), *lubricant_rows()]
+    return [*static_rows(), *stiffness_rows(), *speed_rows(), *reference_speed_rows(), *lubricant_rows()]
 
 
 def static_rows() -> list[Row]:
@@ -74,6 +83,32 @@ def stiffness_rows() -> list[Row]:
         for preload, stiffness in zip(preloads, stiffnesses, strict=True):
             ours = 2.0 * axial_state(bearing, preload).stiffness * 1e-6
             found.append((f"GMN {name}, {preload} N", "pair stiffness, N/µm", float(stiffness), ours))
+    # Balls by the catalogue's own rules.
+    for name in ("7008 C", "7014 C", "7020 C", "7014 E", "7020 E", "71914 C", "71920 C", "71920 E"):
+        *_, preload, stiffness = ULTAGE[name]
+        ours = 2.0 * axial_state(balls(name), preload).stiffness * 1e-6
+        found.append((f"NTN ULTAGE {name}, {preload} N", "pair stiffness, N/µm", stiffness, ours))
+    return found
+
+
+def reference_speed_rows() -> list[Row]:
+    """Heat at the reference speed of SKF's tables (ISO 15312), by the friction models of each kind."""
+    found = []
+    for name, row in GROOVES.items():
+        moment = skf_moment(
+            groove(row), turn(row[5]), 12e-6, 0.0, 50.0 * row[4], friction_ehl=0.05, replenishment=OIL_BATH
+        )
+        ours = moment.total * turn(row[5])
+        found.append((f"{name}, {row[5]} rpm", "SKF without drag, W", reference_heat(row), ours))
+    for name, row in ROLLERS.items():
+        case = (rollers(row), turn(row[5]), 12e-6, 50.0 * row[4])
+        moments = {
+            "Palmgren f_0 1.5, W": palmgren_roller_moment(*case, lubrication_factor=1.5),
+            "SKF without drag, W": skf_roller_moment(*case, replenishment=OIL_BATH),
+        }
+        for quantity, moment in moments.items():
+            ours = moment.total * turn(row[5])
+            found.append((f"{name}, {row[5]} rpm", quantity, reference_heat(row), ours))
     return found
 
 

@@ -4,6 +4,10 @@ IBC Wälzlager GmbH, High Precision Bearings, TI-I-5050.0 / E, September 2010: s
 2.4 (preloads of class H of single bearings), 3.3 (E, C0r of cylindrical roller bearings). Balls and rollers
 are not printed there; their sizes show in the static load ratings (ISO 76). The tolerances are the spread
 between the rows, whose sections do not follow one rule.
+
+NTN-SNR, ULTAGE series 70 and 79 (DOC.IMTO.ULTAGEARG1RUa, 2015): boundary dimensions, static load ratings,
+limiting speeds in grease and oil, preload and axial stiffness of a pair before mounting. Stiffness tells
+number and size of balls at once.
 """
 
 from __future__ import annotations
@@ -19,7 +23,9 @@ from spindle_fem.definition.bearing_catalogue import (
 )
 from spindle_fem.definition.bearing_types import BallBearingType, RollerBearingType
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
+from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
 from spindle_fem.physics.bearings.catalogue_friction import static_load_rating
+from spindle_fem.physics.bearings.preload import axial_state
 
 # Outer raceway, mm.
 RACEWAYS = {
@@ -50,6 +56,57 @@ PRELOADS = {
     "7030 C": 5730, "7040 C": 10310, "7015 E": 1970, "7020 E": 3450, "7030 E": 7670, "7040 E": 13580,
     "7214 C": 1990, "7220 C": 4020, "7228 C": 7850, "7214 E": 2680, "7220 E": 5480, "7228 E": 10820,
 }  # fmt: skip
+
+# Bore, outside, width [mm]; C0 [N]; limiting speeds in grease and oil [rpm]; preload of a pair [N] and its
+# axial stiffness [N/µm].
+ULTAGE = {
+    "7006 C": (30, 55, 13, 11000, 27200, 43600, 98, 48.0),
+    "7008 C": (40, 68, 15, 16800, 21700, 34700, 127, 60.1),
+    "7010 C": (50, 80, 16, 23100, 18000, 28800, 157, 70.5),
+    "7012 C": (60, 95, 18, 32500, 15100, 24200, 216, 79.6),
+    "7014 C": (70, 110, 20, 45000, 13000, 20800, 294, 95.4),
+    "7016 C": (80, 125, 22, 58000, 11400, 18300, 365, 106.3),
+    "7018 C": (90, 140, 24, 72500, 10200, 16300, 440, 117.4),
+    "7020 C": (100, 150, 24, 81000, 9400, 15000, 460, 126.1),
+    "7026 C": (130, 200, 33, 144000, 7100, 11400, 800, 163.2),
+    "7006 E": (30, 55, 13, 10500, 23600, 38100, 147, 104.8),
+    "7010 E": (50, 80, 16, 21900, 15600, 25200, 255, 162.0),
+    "7014 E": (70, 110, 20, 43000, 11300, 18200, 460, 225.2),
+    "7020 E": (100, 150, 24, 76500, 8100, 13100, 740, 300.0),
+    "7026 E": (130, 200, 33, 136000, 6200, 9900, 1270, 390.0),
+    "71910 C": (50, 72, 12, 16600, 19200, 30700, 118, 62.5),
+    "71914 C": (70, 100, 16, 30000, 13800, 22100, 177, 83.9),
+    "71918 C": (90, 125, 18, 46000, 10900, 17400, 255, 105.0),
+    "71920 C": (100, 140, 20, 61000, 9800, 15600, 325, 118.5),
+    "71926 C": (130, 180, 24, 102000, 7600, 12100, 510, 147.4),
+    "71910 E": (50, 72, 12, 15800, 16600, 26900, 177, 138.4),
+    "71914 E": (70, 100, 16, 28600, 11900, 19300, 284, 194.0),
+    "71920 E": (100, 140, 20, 57500, 8500, 13700, 510, 273.7),
+    "71926 E": (130, 180, 24, 95000, 6600, 10600, 800, 350.0),
+}  # fmt: skip
+
+
+def balls(designation):
+    kind = BallBearingType.model_validate(catalogue_bearing(designation))
+    return BearingGeometry(kind.ball_diameter, kind.ball_count, kind.pitch, kind.contact_angle, 0.52, 0.52)
+
+
+@pytest.mark.parametrize("designation", ULTAGE)
+def test_balls_of_another_maker(designation):
+    *dimensions, rating, _, _, preload, stiffness = ULTAGE[designation]
+    assert [1e3 * value for value in boundary_dimensions(designation)[:3]] == pytest.approx(dimensions)
+    assert static_load_rating(balls(designation)) == pytest.approx(rating, rel=0.14)
+    found = 2.0e-6 * axial_state(balls(designation), preload).stiffness
+    assert found == pytest.approx(stiffness, rel=0.12)
+
+
+@pytest.mark.parametrize("designation", ULTAGE)
+def test_attainable_speeds_of_spindle_bearings(designation):
+    bore, outside, _, _, grease, oil, _, _ = ULTAGE[designation]
+    limits = BEARING_KINDS["angular_contact_ball"].attainable_speeds
+    angle = balls(designation).contact_angle
+    assert limits.at(angle, "grease") == pytest.approx(0.5 * (bore + outside) * grease, rel=0.02)
+    assert limits.at(angle, "oil") == pytest.approx(0.5 * (bore + outside) * oil, rel=0.02)
 
 
 def rollers(designation):

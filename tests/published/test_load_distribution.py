@@ -2,7 +2,8 @@
 
 Sources: comments of minzhun/ISO16281's tests, reference program MASTA (deep-groove bearing of C = 23.4 kN
 under radial, axial and combined loads and a moment); ISO 281 (factors f_c of its tables); Harris & Kotzalas,
-Rolling Bearing Analysis, vol. 1 (load integrals of Sjovall for point and line contact).
+Rolling Bearing Analysis, vol. 1 (load integrals of Sjovall for point and line contact); NSK, Technical Report
+E728g, 5.1 (half of a row loaded: the thrust that goes with the radial load, and the greatest load).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scipy.integrate import quad
 from spindle_fem.physics.bearings.ball_system import build_ball_rows, join_rows, solve_bordered
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.line_contact import line_approach
+from spindle_fem.physics.bearings.preload import axial_state
 from spindle_fem.physics.bearings.race_control import static_evaluation
 from spindle_fem.physics.bearings.rating_life import dynamic_load_rating, rating_life
 from spindle_fem.physics.bearings.roller_bearing import RollerGeometry, solve_roller_bearing
@@ -131,6 +133,25 @@ def test_balls_follow_the_published_load_integral(share: float, published: float
     (moved,), load = at_rest(small, [1], [radial], [pressed + 0.5 * clearance])
     assert load[:, 0].max() == pytest.approx(largest, rel=0.02)
     assert moved == pytest.approx(pressed + 0.5 * clearance, rel=0.02)
+
+
+def test_half_of_a_row_is_loaded_at_the_published_thrust() -> None:
+    # F_a = 1.216 F_r tan α loads half of the balls, the greatest with 4.37 F_r / (Z cos α)
+    angle = math.radians(15.0)
+    geometry = BearingGeometry(2e-3, 120, 90e-3, angle, 0.52, 0.52)
+    radial = 60.0
+    thrust = 1.216 * radial * math.tan(angle)
+    pressed = axial_state(geometry, thrust).approach
+    seated = geometry.curvature_centre_distance * math.sin(angle)
+    _, load = at_rest(geometry, [0, 1], [thrust, radial], [seated + pressed, pressed * math.tan(angle)])
+    assert np.count_nonzero(load[:, 0] > 0.0) == pytest.approx(60, abs=3)
+    assert load[:, 0].max() * 120 * math.cos(angle) / radial == pytest.approx(4.37, rel=0.02)
+
+
+def test_half_of_the_rollers_are_loaded_without_clearance() -> None:
+    many = RollerGeometry(1.5e-3, 1.5e-3, 90, 65e-3)
+    load = solve_roller_bearing(many, 1000.0).load[:, 0]
+    assert load.max() * 90 / 1000.0 == pytest.approx(4.08, rel=0.005)
 
 
 @pytest.mark.parametrize(("ratio", "published"), [(0.05, 46.7), (0.10, 55.5), (0.16, 59.6), (0.20, 59.9)])

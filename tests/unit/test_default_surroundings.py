@@ -14,7 +14,7 @@ from spindle_fem.errors import FaultsError
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.operation.driven_flow import channel_warnings
-from spindle_fem.operation.operating_limits import lost_to_air
+from spindle_fem.operation.operating_limits import lost_to_air, speeds_beyond_catalogues
 from spindle_fem.report import run_report
 from spindle_fem.studies.heat_study import RPM, usual_speeds
 from spindle_fem.units import Uncertain
@@ -129,6 +129,29 @@ def test_a_machine_that_loses_no_heat_to_air_is_warned_of() -> None:
         for film in mounted.film
     ]
     assert lost_to_air(mounted.model_copy(update={"film": tuple(still)}))
+
+
+def test_speeds_above_those_of_catalogues_are_warned_of() -> None:
+    # 7014 C: 1.17e6 rpm mm over 90 mm are 13 000 rpm in grease, 20 800 rpm in oil
+    spec = load_machine(PAGE)
+    assert not speeds_beyond_catalogues(spec, 12_900 * RPM)
+    (said,) = speeds_beyond_catalogues(spec, 13_100 * RPM)
+    assert said.code == "speed_above_catalogue"
+    assert said.text.startswith("F1: speed times pitch diameter is 1.18e6 rpm mm")
+    assert said.text.endswith("Likewise F2.")
+    hybrid = load_machine(PAGE, ["bearing_set.front.bearing_type=7014 C HC"])
+    assert not speeds_beyond_catalogues(hybrid, 13_100 * RPM)
+    codes = [item["code"] for item in check_machine(PAGE, overrides=["operation.speed=13100rpm"])["warnings"]]
+    assert "speed_above_catalogue" in codes
+
+
+def test_rollers_and_oil_have_speeds_of_their_own() -> None:
+    lathe, grinder = load_machine("belt_lathe"), load_machine("grinding_spindle")
+    # NN3018: 0.97e6 rpm mm over 115 mm; 7018 AC: 1.015e6 in grease
+    told = speeds_beyond_catalogues(lathe, 8_600 * RPM)
+    assert {item.text[:2] for item in told} == {"F1"}
+    assert not speeds_beyond_catalogues(grinder, 18_000 * RPM)
+    assert speeds_beyond_catalogues(grinder, 18_500 * RPM)
 
 
 def test_speeds_follow_the_machine() -> None:

@@ -171,7 +171,7 @@ def replenishment_factor(
     constant : float
         K_rs: 6e-8 for grease and oil-air, 3e-8 for a low oil bath.
     geometry_constant : float
-        K_Z: 4.4 for single-row angular-contact ball bearings.
+        K_Z, that of the kind: 4.4 for single-row angular-contact ball bearings, 3.1 for deep grooves.
 
     Source: SKF rolling bearings catalogue (2013).
 

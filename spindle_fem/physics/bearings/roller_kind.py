@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from spindle_fem.physics.bearings.bearing_kind import AttainableSpeeds
+
 
 @dataclass(frozen=True, slots=True)
 class RollerKind:
@@ -23,6 +25,8 @@ class RollerKind:
         Its sliding friction coefficient in full film.
     skf_replenishment : float, [-]
         Its K_Z.
+    attainable_speeds : AttainableSpeeds or None
+        None: no catalogue says.
     """
 
     source: str
@@ -32,3 +36,4 @@ class RollerKind:
     skf_sliding: float
     skf_friction_ehl: float
     skf_replenishment: float
+    attainable_speeds: AttainableSpeeds | None = None

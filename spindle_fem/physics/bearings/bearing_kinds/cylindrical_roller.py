@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from spindle_fem.physics.bearings.bearing_kind import AttainableSpeeds
 from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
 from spindle_fem.physics.bearings.roller_kind import RollerKind
 
@@ -16,5 +17,11 @@ CYLINDRICAL_ROLLER = RollerKind(
     skf_sliding=1.5e-3,
     skf_friction_ehl=0.02,
     skf_replenishment=5.1,
+    # Limiting speeds of NU 10 with machined cages, bores of 75 to 120 mm: 0.94 to 0.99e6.
+    attainable_speeds=AttainableSpeeds(
+        source="SKF general catalogue 6000, 2006",
+        grease=((0.0,), (0.97e6,)),
+        oil=((0.0,), (0.97e6,)),
+    ),
 )
 BEARING_KINDS.add("cylindrical_roller", CYLINDRICAL_ROLLER)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from spindle_fem.physics.bearings.bearing_kind import BearingKind
+from spindle_fem.physics.bearings.bearing_kind import AttainableSpeeds, BearingKind
 from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
 
 DEEP_GROOVE_BALL = BearingKind(
@@ -20,6 +20,13 @@ DEEP_GROOVE_BALL = BearingKind(
     skf_sliding=(),
     # Series 60; of series 62 3.9e-7, 1.7, 3.23e-3, 36.5.
     skf_groove=(4.1e-7, 1.7, 3.73e-3, 14.6),
+    skf_replenishment=3.1,
+    # Limiting speeds of open 60xx and 62xx with pressed cages, bores of 25 to 60 mm: 0.66 to 0.76e6.
+    attainable_speeds=AttainableSpeeds(
+        source="SKF general catalogue 6000, 2006",
+        grease=((0.0,), (0.7e6,)),
+        oil=((0.0,), (0.7e6,)),
+    ),
     palmgren_axial_factor=3.0,
     rated_contact_angle=0.0,
 )

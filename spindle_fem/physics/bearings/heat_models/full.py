@@ -75,7 +75,12 @@ def _rolling_powers(inputs: HeatInputs, options: HeatOptions) -> tuple[FloatArra
     )
     reduction *= float(
         replenishment_factor(
-            inputs.speed, bore, outer, inputs.kinematic_viscosity, constant=options.skf_replenishment
+            inputs.speed,
+            bore,
+            outer,
+            inputs.kinematic_viscosity,
+            constant=options.skf_replenishment,
+            geometry_constant=inputs.geometry.catalogue.skf_replenishment,
         )
     )
     lossy = hysteresis_force(patch.load, patch.semi_minor, patch.rolling_radius, options.hysteresis_loss)
