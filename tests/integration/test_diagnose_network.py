@@ -238,6 +238,7 @@ def test_what_is_held_out_does_not_touch_the_findings(machine, heated, tmp_path)
     assert again["fit"]["after"]["heldout_rmse_K"] > 1.5
 
 
+@pytest.mark.slow
 def test_the_improved_machine_simulates_what_the_diagnosis_predicts(machine, heated, tmp_path, monkeypatch):
     """Read back by another command; temperatures at the start are then those of the first readings."""
     # A definition has no keys for all that directions may be: without them both say the same.

@@ -119,7 +119,14 @@ def test_its_steady_state_is_that_of_the_coupled_full_model(machine, fast, speed
 
 
 @pytest.mark.parametrize(
-    ("seats", "factor"), [("F2", 0.26), ("F1", 0.05), ("R2", 4.0), ("F1 F2 F3", 0.1)], ids=lambda v: str(v)
+    ("seats", "factor"),
+    [
+        ("F1", 0.05),
+        ("R2", 4.0),
+        pytest.param("F2", 0.26, marks=pytest.mark.slow),
+        pytest.param("F1 F2 F3", 0.1, marks=pytest.mark.slow),
+    ],
+    ids=lambda v: str(v),
 )
 def test_a_seat_that_alone_is_worse_moves_the_probes_as_in_the_full_model(machine, fast, seats, factor):
     on_mesh, model = build_mesh_model(machine), fast.model

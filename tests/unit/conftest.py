@@ -20,7 +20,7 @@ def fast(spec):
 
 @pytest.fixture(scope="session")
 def steps():
-    times = np.arange(0.0, 7200.0, 20.0)
+    times = np.arange(0.0, 7200.0, 60.0)
     speed = np.select([times < 600, times < 3000, times < 5400], [0.0, 3000.0, 1500.0], 4000.0)
     return drive_of(
         times, speed, ambient=293.0 + np.sin(times / 900.0), inlet=289.0 + 0.5 * np.cos(times / 500.0)

@@ -146,6 +146,7 @@ def warmed():
     return fast_spindle(lumped_model(spec), spec)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_film_follows_the_wall(warmed, drive, tmp_path):
     space, path = geometry_state_space(warmed, "lumped", 4500.0 * RPM), tmp_path / "model.c"
