@@ -1,13 +1,23 @@
 """What tests of several folders share."""
 
+import gc
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from spindle_fem.commands import sweep_command
 from tests.support.written_texts import manifest_text
+
+# Modules and collected tests are millions of objects that stay: searching them for garbage again and again
+# took a tenth of the processor time.
+gc.set_threshold(50_000, 20, 20)
+
+
+def pytest_collection_finish():
+    """Keep modules and collected tests out of every later search for garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 def write_recording(
@@ -41,5 +51,7 @@ def recorded_in() -> Callable[..., Path]:
 @pytest.fixture
 def unpictured(monkeypatch):
     """Sweeps without pictures and report, which take longer than a few small designs."""
+    from spindle_fem.commands import sweep_command
+
     monkeypatch.setattr(sweep_command, "_pictured", lambda *told, **settings: {})
     monkeypatch.setattr(sweep_command, "write_sweep_report", lambda *told: None)
