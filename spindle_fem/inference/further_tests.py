@@ -11,15 +11,19 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import NO_VALUES, OF_ONE_RECORDING
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.misdescription_columns import direction_columns
+from spindle_fem.inference.planned_test import DISPLACEMENT_NOISE
 from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.schedules import HOLD, geometry_schedules, network_schedules
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.reduced.drive import STANDARD, Drive, make_drive
 from spindle_fem.model.reduced.run_start import Start
+from spindle_fem.recordings.displaced_readings import MICROMETRES
 
 Array = NDArray[np.float64]
 
@@ -27,6 +31,9 @@ Array = NDArray[np.float64]
 TEST_STEP = 120.0
 # Name of the test that repeats the recorded operation.
 AGAIN = "the same operation again"
+# White noise [µm] and slow error of a displacement sensor that is not there yet.
+FURTHER_DISPLACEMENT = MICROMETRES * DISPLACEMENT_NOISE
+FURTHER_SLOW = SlowError(tuned.DISPLACEMENT_SLOW_SIGMA, tuned.EXPECTED_SLOW_TIME)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +63,16 @@ class Place:
     Attributes
     ----------
     name : str
-        Place of the reduced model; a probe where ``is_probe``.
+        Place of the reduced model; a probe or a displacement sensor where ``is_probe``.
+    displaced : bool
+        Whether it reads a displacement, in µm.
     """
 
     name: str
     words: str
     component: str
     is_probe: bool = False
+    displaced: bool = False
 
 
 class TrialPredictor(Predictor):
@@ -140,7 +150,7 @@ def answer(
     readings, slopes = [predicted.temperature], [predicted.sensitivity]
     if places:
         means = np.array([_weights(predictor, place) for place in places])
-        readings.append(predicted.states @ means.T)
+        readings.append(predicted.states @ means.T + _stretch(predictor, own.drives[0], places))
         slopes.append(predicted.slopes_at(means))
     directions = [item for item in predictor.misdescribed if item.coordinate in values]
     if directions:
@@ -159,7 +169,8 @@ def answer(
     times = times[times <= grid[-1]]
     whole = np.concatenate(readings, axis=1)
     by = np.concatenate(slopes, axis=1) * np.array([c.sigma for c, _ in chosen])
-    displaced = slice(predictor.recordings[0].temperature_count, predicted.temperature.shape[1])
+    read = range(predictor.recordings[0].temperature_count, predicted.temperature.shape[1])
+    displaced = [*read, *(read.stop + i for i, place in enumerate(places) if place.displaced)]
     for values in (whole, by):
         values[:, displaced] -= values[0, displaced].copy()
     full = np.zeros((len(times), whole.shape[1], len(fit.coordinates)))
@@ -170,6 +181,18 @@ def answer(
 def _weights(predictor: Predictor, place: Place) -> Array:
     model = predictor.fast.model
     return model.probes[model.probe_names.index(place.name)] if place.is_probe else model.place(place.name)
+
+
+def _stretch(predictor: Predictor, drive: Drive, places: Sequence[Place]) -> Array:
+    """What rotation adds to the reading of displacement sensors at the ends of the steps, (G + 1, k) µm."""
+    model, column = predictor.fast.model, drive.column("speed") if "speed" in drive.names else None
+    spins = np.zeros(len(places))
+    for index, place in enumerate(places if model.probe_spins.size else ()):
+        if place.displaced:
+            spins[index] = model.probe_spins[model.probe_names.index(place.name)]
+    if column is None:
+        return np.zeros((1, len(places)))
+    return np.square(np.append(drive.start[:, column], drive.end[-1:, column]))[:, None] * spins
 
 
 def _at(times: Array, grid: Array, values: Array) -> Array:
@@ -223,6 +246,15 @@ def beside_probes(names: Sequence[str], probes: Sequence[str]) -> tuple[Place, .
     """A second sensor beside each of some probes, those of ``names`` that a model has as points."""
     return tuple(
         Place(name, f"a second sensor beside {name}", name, True) for name in names if name in probes
+    )
+
+
+def unread_displacements(spec: MachineSpec, read: Sequence[str]) -> tuple[Place, ...]:
+    """Displacement sensors of a definition that are not read."""
+    return tuple(
+        Place(item.name, f"displacement sensor {item.name} of the definition", "shaft", True, True)
+        for item in spec.displacement_sensor
+        if item.name not in read
     )
 
 

@@ -15,6 +15,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -23,7 +24,15 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun, Variant, variants_of
 from spindle_fem.inference.coordinate_names import NO_VALUES
 from spindle_fem.inference.diagnosis import overlapping_components
-from spindle_fem.inference.further_tests import Place, network_places, reachable_places
+from spindle_fem.inference.further_tests import (
+    FURTHER_DISPLACEMENT,
+    FURTHER_SLOW,
+    Place,
+    network_places,
+    reachable_places,
+    unread_displacements,
+)
+from spindle_fem.inference.growth_misdescriptions import EXPANSION_SIGMA
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Problem, candidate_coordinates
 from spindle_fem.inference.misdescription_columns import (
@@ -266,7 +275,7 @@ def _interval_candidates(view: MachineView, duration: float) -> list[Candidate]:
 
 
 def _places(machine: DiagnosedMachine, predictor: Predictor) -> tuple[Place, ...]:
-    """Places for a further sensor: probes that are not read, then other places."""
+    """Places for a further sensor: probes that are not read, other places, unread displacement sensors."""
     model, read = predictor.fast.model, predictor.recordings[0].probes
     if machine.is_network:
         return network_places(model.place_names, read)
@@ -275,7 +284,8 @@ def _places(machine: DiagnosedMachine, predictor: Predictor) -> tuple[Place, ...
         for probe in machine.spec.probe
         if probe.name in model.probe_names and probe.name not in read
     ]
-    return (*unread, *reachable_places(predictor.fast.spec, model.place_names))
+    reachable = reachable_places(predictor.fast.spec, model.place_names)
+    return (*unread, *reachable, *unread_displacements(machine.spec, read))
 
 
 def _forms(variants: Sequence[Variant]) -> tuple[EffectForms, tuple[Hypothetical, ...]]:
@@ -314,6 +324,23 @@ def _means(predictor: Predictor, places: Sequence[Place]) -> Array:
     return np.array(rows).reshape(-1, model.size)
 
 
+def _growth(readings: Array, places: Sequence[Place], read: int) -> Array:
+    """What other coefficients of expansion do to displacement sensors among the places, (G + 1, c, d) µm.
+
+    Of each by itself, for a normal coordinate of unit width.
+
+    Parameters
+    ----------
+    readings : (G + 1, k) ndarray
+        Of the places, which follow ``read`` channels.
+    """
+    grown = [index for index, place in enumerate(places) if place.displaced]
+    found = np.zeros((len(readings), read + len(places), len(grown)))
+    for column, index in enumerate(grown):
+        found[:, read + index, column] = EXPANSION_SIGMA * (readings[:, index] - readings[0, index])
+    return found
+
+
 def _products(
     problem: Problem,
     number: int,
@@ -337,20 +364,23 @@ def _products(
     for index, coordinate in enumerate(belief.coordinates):
         if coordinate.name in moved:
             slopes[:, read:, index] += moved[coordinate.name]
-    slopes = slopes * scale
+    slopes = np.concatenate((slopes * scale, _growth(told.states @ means.T, places, read)), axis=2)
     answers = BaseRun(predictor, number, values, places=means).responses(variants)
     own = [
         (item, white)
         for item, white in zip(problem.observations, problem.whiteners, strict=True)
         if item.recording == number
     ]
-    # A further sensor reads as often as the others, with the usual noise of a temperature.
+    # A further sensor reads as often as the others, with the usual noise of what it reads.
     first, recording = own[0][0], predictor.recordings[number]
     noise = float(np.median(recording.sigma[: recording.temperature_count]))
-    usual = Whitener(replace(first.bins, white=noise), problem.slow)
-    own += [(replace(first, channel=read + i), usual) for i in range(len(places))]
+    usual = {
+        False: Whitener(replace(first.bins, white=noise), problem.slow),
+        True: Whitener(replace(first.bins, white=FURTHER_DISPLACEMENT, key=-1), FURTHER_SLOW),
+    }
+    own += [(replace(first, channel=read + i), usual[place.displaced]) for i, place in enumerate(places)]
     return ChannelProducts.of(
-        belief.root.T @ belief.root,
+        block_diag(belief.root.T @ belief.root, np.eye(slopes.shape[2] - len(scale))),
         [white(item.at(slopes[:, item.channel])) for item, white in own],
         [white(item.at(answers[:, item.channel])) for item, white in own],
     )

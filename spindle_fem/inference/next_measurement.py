@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
 from spindle_fem.inference.further_tests import (
     AGAIN,
+    FURTHER_DISPLACEMENT,
+    FURTHER_SLOW,
     Answer,
     Place,
     Trial,
@@ -32,7 +35,9 @@ from spindle_fem.inference.further_tests import (
     network_places,
     reachable_places,
     trials_of,
+    unread_displacements,
 )
+from spindle_fem.inference.growth_misdescriptions import EXPANSION_SIGMA
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.verdict import Ranked, rank
@@ -210,9 +215,11 @@ def evaluate(
         places = (
             *beside_probes(tuple(doubted), predictor.fast.model.probe_names),
             *reachable_places(predictor.fast.spec, predictor.fast.model.place_names),
+            *unread_displacements(predictor.fast.spec, recording.probes),
         )
     count, read = len(recording.temperature_names), recording.temperature_count
-    white = np.append(recording.sigma, np.full(len(places), float(np.median(recording.sigma[:read]))))
+    usual = float(np.median(recording.sigma[:read]))
+    white = [*recording.sigma.tolist(), *(FURTHER_DISPLACEMENT if p.displaced else usual for p in places)]
     step = float(np.median(np.diff(recording.times)))
     names = (*recording.temperature_names, *(place.words for place in places))
     moved = recording.temperature_names[read:]
@@ -227,25 +234,23 @@ def evaluate(
         except NOT_SIMULATED as error:
             failed.append({"condition": trial.name, "reason": str(error)})
             continue
-        slow = diagnosis.final.slow
-        noise = [
-            reading_covariance(answers[0].times, sigma, step, spacing, slow)
-            if not read <= channel < count
-            else reading_covariance(
-                answers[0].times,
-                sigma,
-                step,
-                spacing,
-                slow.of(channel - count),
-                counted_from=float(trial.drive.grid[0]),
-            )
-            for channel, sigma in enumerate(white)
-        ]
+        slow, begin, noise = diagnosis.final.slow, float(trial.drive.grid[0]), []
+        for channel, sigma in enumerate(white):
+            usual_of = partial(reading_covariance, answers[0].times, sigma, step, spacing)
+            if channel >= count and places[channel - count].displaced:
+                # By coefficients of expansion that are not those of the definition as well.
+                grown = EXPANSION_SIGMA * answers[0].readings[:, channel]
+                noise.append(usual_of(FURTHER_SLOW, counted_from=begin) + np.outer(grown, grown))
+            elif read <= channel < count:
+                noise.append(usual_of(slow.of(channel - count), counted_from=begin))
+            else:
+                noise.append(usual_of(slow))
         for position in (None, *range(len(places))):
             chosen = [*range(count), *([] if position is None else [count + position])]
             place = None if position is None else places[position]
             option = _option(trial, place, answers, fits, weights, chosen, noise, names)
-            options.append(replace(option, displaced=place is None and option.channel in moved))
+            displaced = option.channel in moved if place is None else place.displaced
+            options.append(replace(option, displaced=displaced))
     return options, failed
 
 

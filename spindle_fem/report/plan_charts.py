@@ -165,6 +165,10 @@ def sensor_places(content: Mapping[str, Any], spec: MachineSpec) -> Figure:
     if at:
         x, y = np.array(at).T
         figure.axes[0].plot(x, y, linestyle="none", marker="o", markersize=7.0, color=CYCLE[1], zorder=8)
-    notes = f"Orange dots: the sensors that are read. Framed: the best place for one more ({plain(best)})."
+    notes = "Orange dots: the sensors that are read. "
+    if best in {sensor.name for sensor in spec.displacement_sensor}:
+        notes += f"The best one to add, {plain(best)}, reads a displacement and is not drawn."
+    else:
+        notes += f"Framed: the best place for one more ({plain(best)})."
     set_title(figure, "Where one more sensor helps", notes)
     return figure

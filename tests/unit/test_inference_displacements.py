@@ -22,6 +22,7 @@ from spindle_fem.inference.findings import (
     predictions_at_stamps,
     rmse,
 )
+from spindle_fem.inference.further_tests import answer, trials_of, unread_displacements
 from spindle_fem.inference.growth_misdescriptions import growth_misdescriptions
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.hidden_states import answer_of, readings_about
@@ -443,6 +444,34 @@ def test_the_dataset_of_a_diagnosis_keeps_displacements_apart(diagnosed):
     assert left[1] < 0.15e-6
     (shown, *_), _ = drawn_lines(displaced_before_after(data, 0))
     assert np.ptp(shown) == pytest.approx(1e6 * np.ptp(read), rel=1e-4)
+
+
+def test_one_that_is_not_read_answers_a_test_as_one_that_is(heated):
+    """In µm from the start of the test, the stretch by rotation included."""
+    opened = with_growth(heated[0])
+    fast = opened.fast
+    spins = np.array([0.0] * (len(fast.model.probe_names) - 1) + [2e-5])
+    fast = fast_spindle(replace(fast.model, probe_spins=spins), fast.spec)
+    predictor = Predictor(fast, opened.recordings)
+    fit = Problem(predictor, known_before(predictor), EXPECTED_SLOW, predictor.observations).fit()
+    (place,) = unread_displacements(opened.spec, ("SP01", "SP05"))
+    assert unread_displacements(opened.spec, ("SP01", "S1")) == ()
+    for trial in trials_of(predictor, opened.view)[:3]:
+        told = answer(predictor, fit, trial, (place,), 600.0)
+        read, further = told.readings[:, 2:].T
+        assert np.ptp(read) > 1.0
+        np.testing.assert_allclose(further, read, atol=1e-6)
+        np.testing.assert_allclose(told.slopes[:, 3], told.slopes[:, 2], atol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_diagnosis_without_displacements_proposes_one(heated):
+    """Of a machine whose definition has a sensor that nobody read."""
+    proposal = next_measurement(diagnose_recordings(heated[0]))
+    sensor = "displacement sensor S1 of the definition"
+    (option,) = (item for item in proposal["options"] if item["where"] == sensor)
+    assert option["sigma_um"] > 0.1
+    assert "difference_K" not in option
 
 
 @pytest.mark.slow

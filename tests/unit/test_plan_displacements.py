@@ -7,12 +7,14 @@ import json
 import pytest
 
 from spindle_fem.commands.plan_command import planned_measurement
+from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import SpindleFemError
 from spindle_fem.inference import misdescription_columns, opened_machine
 from spindle_fem.inference.diagnosis_content import plain_data
 from spindle_fem.inference.growth_misdescriptions import growth_misdescriptions
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.plan_content import plan_content
+from spindle_fem.report.plan_charts import sensor_places
 from spindle_fem.report.plan_report import write_plan_report
 from tests.support.nose_spindle import nose_machine, nose_recording
 
@@ -58,6 +60,23 @@ def test_a_displacement_beside_a_temperature_tells_more(plans):
         for names in [[(own.effect, own.component) for own in item.hypotheticals]]
     ]
     assert seen[1] < 0.7 * seen[0]
+
+
+def test_one_that_is_not_read_is_among_the_sensors_to_add(machine, plans):
+    """It gains nearly what a plan that reads it finds: expansion is in doubt for each by itself."""
+    one, both = (item.plan for item in plans)
+    (added,) = (item for item in one.further_sensors if item.name == "S1")
+    assert added.words == "displacement sensor S1 of the definition"
+    assert not [item for item in both.further_sensors if item.name == "S1"]
+    gained, found = (item.information - one.asked.information for item in (added, both.asked))
+    assert 0.9 * found < gained < found
+    planned = plans[0]
+    content = plan_content(
+        one, planned.sensors, planned.test, planned.inputs, planned.compared, planned.notes
+    )
+    content["best_next_sensor"]["name"] = "S1"
+    figure = sensor_places(content, load_machine(machine))
+    assert "S1, reads a displacement and is not drawn" in str([text.get_text() for text in figure.texts])
 
 
 def test_its_noise_is_a_length(machine, plans):
