@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from spindle_fem.definition.machine_spec import DisplacementSensor, MachineSpec
+from spindle_fem.definition.displacement_tables import FRAME, DisplacementSensor, MountSpot, SensorSpot
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import SpecError, SpindleFemError, did_you_mean
 
 _TOLERANCE = 1.0e-6
@@ -41,30 +42,49 @@ def _target(spec: MachineSpec, sensor: DisplacementSensor) -> Iterator[SpindleFe
                 did_you_mean(sensor.at, surfaces) or "Give a surface, or z, radius and angle of a spot.",
             )
         return
-    z, radius = sensor.at.z, sensor.at.radius
+    if not _is_face(spec, sensor.at, rotating=True):
+        yield SpecError(
+            where,
+            f"nothing that turns has a face at {_words(sensor.at)}.",
+            "Put it on an end or on the outside of a segment of the shaft.",
+        )
+
+
+def _words(spot: SensorSpot | MountSpot) -> str:
+    return f"z {spot.z * 1e3:g} mm, radius {spot.radius * 1e3:g} mm"
+
+
+def _is_face(spec: MachineSpec, spot: SensorSpot | MountSpot, *, rotating: bool) -> bool:
+    """Whether a spot lies on an end or on the outside of a segment that turns, or of one that stands."""
     for part in spec.part:
-        for segment in part.segment if part.rotating else ():
+        for segment in part.segment if part.rotating is rotating else ():
             low, high = segment.z
             radii = (0.5 * segment.inner_diameter, 0.5 * segment.outer_diameter)
-            on_cylinder = abs(radius - radii[1]) < _TOLERANCE and low - _TOLERANCE <= z <= high + _TOLERANCE
-            on_end = (
-                min(abs(z - low), abs(z - high)) < _TOLERANCE
-                and radii[0] - _TOLERANCE <= radius <= radii[1] + _TOLERANCE
-            )
-            if on_cylinder or on_end:
-                return
-    yield SpecError(
-        where,
-        f"nothing that turns has a face at z {z * 1e3:g} mm, radius {radius * 1e3:g} mm.",
-        "Put it on an end or on the outside of a segment of the shaft.",
-    )
+            along = low - _TOLERANCE <= spot.z <= high + _TOLERANCE
+            across = radii[0] - _TOLERANCE <= spot.radius <= radii[1] + _TOLERANCE
+            on_end = min(abs(spot.z - low), abs(spot.z - high)) < _TOLERANCE
+            if (along and abs(spot.radius - radii[1]) < _TOLERANCE) or (across and on_end):
+                return True
+    return False
 
 
 def _mount(spec: MachineSpec, sensor: DisplacementSensor) -> Iterator[SpindleFemError]:
-    standing = {s.name: s for part in spec.part if not part.rotating for s in part.segment if s.name}
-    if sensor.mount not in standing:
+    where = f"displacement_sensor.{sensor.name}.mount"
+    if isinstance(sensor.mount, MountSpot):
+        if not _is_face(spec, sensor.mount, rotating=False):
+            yield SpecError(
+                where,
+                f"nothing that stands has a face at {_words(sensor.mount)}.",
+                "Put it on an end or on the outside of a segment of the housing or a cover.",
+            )
+        return
+    standing = [part for part in spec.part if not part.rotating]
+    segments = [segment.name for part in standing for segment in part.segment if segment.name]
+    parts = {part.name for part in standing}
+    allowed = [FRAME, *segments, *(surface.name for surface in spec.surface if surface.part in parts)]
+    if sensor.mount not in allowed:
         yield SpecError(
-            f"displacement_sensor.{sensor.name}.mount",
-            f'"{sensor.mount}" is no segment of a standing part.',
-            did_you_mean(sensor.mount, standing),
+            where,
+            f'"{sensor.mount}" is no segment or surface of a standing part.',
+            did_you_mean(sensor.mount, allowed),
         )

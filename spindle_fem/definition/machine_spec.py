@@ -12,10 +12,11 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from spindle_fem.definition.bearing_types import BallBearingType, BearingType, RollerBearingType
 from spindle_fem.definition.circuit_tables import CircuitFilm, Film
+from spindle_fem.definition.displacement_tables import DisplacementSensor
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.exchange_tables import (
     Channel,
@@ -221,36 +222,6 @@ class Probe(SpecModel):
             what = "is missing." if self.circuit is None else "is given."
             raise_faults([Fault("circuit", what, 'It goes with kind = "circuit_outlet".')])
         return self
-
-
-class SensorSpot(SpecModel):
-    """A spot on the outside of the turning body."""
-
-    z: Length
-    """Along the axis."""
-    radius: Radius
-    """Distance from the axis."""
-    angle: Angle = 0.0
-    """Around the axis; 0 is up."""
-
-
-class DisplacementSensor(SpecModel):
-    """A displacement sensor on the machine's mount that reads the shaft.
-
-    Its reading is the movement of the shaft since assembly, by temperature and rotation.
-    """
-
-    name: Name
-    """Name in results and recordings."""
-    at: Annotated[
-        Annotated[Name, Tag("name")] | Annotated[SensorSpot, Tag("spot")],
-        Discriminator(lambda given: "name" if isinstance(given, str) else "spot"),
-    ]
-    """Target: a surface of the shaft, or a spot on it."""
-    direction: Literal["axial", "radial"]
-    """Axial readings grow away from the mount, radial ones outwards."""
-    mount: Name = "flange"
-    """Part that holds the sensor: the segment of the housing that is its flange."""
 
 
 class MeshSettings(SpecModel):
@@ -473,7 +444,6 @@ __all__ = [
     "RadialLoad",
     "RollerBearingType",
     "RotatingFilm",
-    "SensorSpot",
     "SetBearing",
     "SharedFactor",
     "SourceTable",

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from spindle_fem.definition.displacement_tables import DisplacementSensor
 from spindle_fem.definition.load import load_machine
-from spindle_fem.definition.machine_spec import DisplacementSensor
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.recordings.align import read_recording
 from tests.support.lumped_spindle import lumped_model

@@ -9,6 +9,7 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import BadInputError, SpecError
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.meshing.build_mesh import build_mesh
+from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.elastic.deformed_shape import deformed_shapes
 from spindle_fem.model.elastic.machine_growth import GrowthModel
 
@@ -47,7 +48,15 @@ def machine(tmp_path, *sensors: dict, more: str = "", overrides: tuple[str, ...]
             'angel: unknown key. Did you mean "angle"',
         ),
         ({"direction": "sideways"}, "Allowed: axial, radial"),
-        ({"mount": "flangge"}, 'mount: "flangge" is no segment of a standing part. Did you mean "flange"'),
+        (
+            {"mount": "flangge"},
+            'mount: "flangge" is no segment or surface of a standing part. Did you mean "flange"',
+        ),
+        ({"mount": "shaft.nose_end"}, "no segment or surface of a standing part"),
+        (
+            {"mount": {"z": "30 mm", "radius": "149 mm"}},
+            "mount: nothing that stands has a face at z 30 mm, radius 149 mm",
+        ),
     ],
 )
 def test_a_sensor_on_nothing_is_refused(tmp_path, change: dict, message: str) -> None:
@@ -65,7 +74,14 @@ def grown(tmp_path_factory):
     """A machine with sensors, all of one material, on a coarse mesh."""
     bottom = TOP | {"name": "S3", "at": TOP["at"] | {"angle": "180 deg"}}
     tip = {"name": "S4", "at": {"z": "0 mm", "radius": "60 mm"}, "direction": "axial"}
-    spec = machine(tmp_path_factory.mktemp("sensors"), AXIAL, TOP, bottom, tip)
+    others = [
+        tip | {"name": "S5", "mount": {"z": "40 mm", "radius": "170 mm"}},
+        TOP | {"name": "S6", "mount": {"z": "50 mm", "radius": "190 mm"}},
+        tip | {"name": "S7", "mount": "housing.flange_back"},
+        tip | {"name": "S8", "mount": "frame"},
+        bottom | {"name": "S9", "mount": {"z": "50 mm", "radius": "190 mm"}},
+    ]
+    spec = machine(tmp_path_factory.mktemp("sensors"), AXIAL, TOP, bottom, tip, *others)
     steel = {key: m.model_copy(update={"thermal_expansion": 12e-6}) for key, m in spec.materials.items()}
     spec = spec.model_copy(update={"materials": steel})
     mesh = build_mesh(build_assembly(spec), preset="coarse")
@@ -95,6 +111,80 @@ def test_a_bent_housing_lifts_one_side_and_lowers_the_other(grown) -> None:
     assert abs(lift) > 1e-9
     # the tip above the axis goes against the way that it tilts
     assert read["S4"] - read["S1"] == pytest.approx(0.060 * growth.nose_tilt[0], abs=2e-9)
+
+
+def test_a_holder_on_the_housing_moves_with_it(grown) -> None:
+    """Evenly warm, target and holder move apart by α ΔT times their distance along the sensor's direction."""
+    _, mesh, model = grown
+    rise = np.full(mesh.n_corners, model.assembly_temperature + 10.0)
+    read = model.displacements(rise, 0.0)
+    assert read["S5"] == pytest.approx(12e-5 * 0.040, rel=1e-3)
+    assert read["S6"] == pytest.approx(12e-5 * (0.090 - 0.190), rel=1e-3)
+    assert read["S7"] == pytest.approx(read["S4"], rel=1e-9)
+    assert read["S8"] == read["S4"]
+
+
+def test_a_holder_on_a_bent_housing_takes_its_own_shift_off(grown) -> None:
+    """What sensors on the housing read less than those on the frame is the shift of the place itself.
+
+    The field that the mesh has around the ports is 1 % off the even slope.
+    """
+    _, mesh, model = grown
+    warm_above = model.assembly_temperature + 10.0 * mesh.points[: mesh.n_corners, 1]
+    read = model.displacements(warm_above, 0.0)
+    places = {"S5": (0.040, 0.170), "S6": (0.050, 0.190)}
+    shifts = {name: _of_housing(model, *place) for name, place in places.items()}
+    # S4 and S5 look backwards at the tip: away from the mount is forwards.
+    assert read["S4"] - read["S5"] == pytest.approx(-shifts["S5"][0], rel=0.02)
+    assert read["S2"] - read["S6"] == pytest.approx(shifts["S6"][1], rel=0.02)
+    assert read["S3"] - read["S9"] == pytest.approx(-shifts["S6"][1], rel=0.02)
+    assert min(abs(shifts["S5"][0]), abs(shifts["S6"][1])) > 1e-8
+
+
+def _of_housing(model, z, r):
+    """Shift (along, outwards) of a spot on top of the housing from the plane behind the flange, at 10 K/m."""
+    body, (back, mount, turn) = model._bent_housing, model._frame
+    moved = body.solve(body.expansion_load() @ (10.0 * body.section.mesh.p[1]))
+    side = body.side_at(z, r)
+    middle = body.middle_of(side)
+    along = body.mean_shift(side, (1.0, 0.0, 0.0)) @ moved + middle[1] * (turn @ moved)
+    out = body.mean_shift(side, (0.0, 1.0, 0.0)) @ moved - mount @ moved
+    return along, out - (middle[0] - back.z[0]) * (turn @ moved)
+
+
+def test_a_machine_without_a_flange_has_sensors_on_its_housing(grown, tmp_path) -> None:
+    """Its nose is not defined, as nothing says what stands still; its sensors' readings are."""
+    spec, mesh, _ = grown
+    held = {"z": "50 mm", "radius": "190 mm"}
+    sensors = (AXIAL | {"mount": held}, TOP | {"mount": held})
+    plain = machine(tmp_path, *sensors)
+    narrow = [
+        part.model_copy(
+            update={
+                "segment": tuple(
+                    s.model_copy(update={"name": "front"}) if s.name == "flange" else s for s in part.segment
+                )
+            }
+        )
+        for part in plain.part
+    ]
+    bare = plain.model_copy(update={"part": tuple(narrow), "materials": spec.materials})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Layout, "_flange", lambda self: "")
+        found = GrowthModel(bare, mesh, 1)
+        rise = np.full(mesh.n_corners, found.assembly_temperature + 10.0)
+        read = found.displacements(rise, 0.0)
+        assert found.at(rise, 0.0, found.assembly_forces).nose_axial is None
+        with pytest.raises(SpecError, match="the housing has no flange"):
+            GrowthModel(plain.model_copy(update={"displacement_sensor": spec.displacement_sensor}), mesh, 1)
+    assert read["S1"] == pytest.approx(12e-5 * 0.050, rel=0.02)
+    assert read["S2"] == pytest.approx(-12e-6, rel=1e-3)
+
+
+def test_a_surface_of_several_faces_holds_no_sensor(grown, tmp_path) -> None:
+    spec = machine(tmp_path, AXIAL | {"mount": "housing.outside"})
+    with pytest.raises(SpecError, match=r'mount: "housing\.outside" is more than one plane or cylinder'):
+        GrowthModel(spec, grown[1], 1)
 
 
 def test_fast_running_stretches_the_nose(grown) -> None:

@@ -129,6 +129,19 @@ class ElasticBody:
         GeometryError
             A face that is not on this body.
         """
+        basis = self._on(face)
+        load = forms.mean_shift.assemble(basis, direction=tuple(direction), lever=int(lever))
+        return load / float(np.sum(basis.dx * basis.default_parameters()["x"][1]))
+
+    def middle_of(self, face: Face) -> tuple[float, float]:
+        """Area means of z and of r over a face, m."""
+        basis = self._on(face)
+        z, r = basis.default_parameters()["x"]
+        weight = basis.dx * r / float(np.sum(basis.dx * r))
+        return float(np.sum(weight * z)), float(np.sum(weight * r))
+
+    def _on(self, face: Face) -> FacetBasis:
+        """Sides of elements on the boundary that make up a face."""
         middle = self.section.mesh.p[:, self.section.mesh.facets].mean(axis=1)
         inside = np.ones(middle.shape[1], dtype=bool)
         for values, (low, high) in zip(middle, (face.z, face.r), strict=True):
@@ -139,16 +152,14 @@ class ElasticBody:
             raise GeometryError(
                 self.name, f"no face at z {face.z}, r {face.r} m.", "Give a face of the body."
             )
-        basis = FacetBasis(self.section.mesh, self.basis.elem, facets=boundary, intorder=QUADRATURE_DEGREE)
-        load = forms.mean_shift.assemble(basis, direction=tuple(direction), lever=int(lever))
-        return load * 2.0 * np.pi / face.area
+        return FacetBasis(self.section.mesh, self.basis.elem, facets=boundary, intorder=QUADRATURE_DEGREE)
 
-    def spot_shift(self, z: float, r: float, direction: Sequence[float]) -> Array:
-        """Output: displacement along (z, r) of the boundary's element side nearest to a spot."""
+    def side_at(self, z: float, r: float) -> Face:
+        """The boundary's element side nearest to a spot."""
         points = self.section.mesh.p[:, self.section.mesh.facets[:, self.section.mesh.boundary_facets()]]
         nearest = np.argmin(np.hypot(*(points.mean(axis=1) - np.array([[z], [r]]))))
         low, high = points[:, :, nearest].min(axis=1), points[:, :, nearest].max(axis=1)
-        return self.mean_shift(Face(*zip(low.tolist(), high.tolist(), strict=True)), direction)
+        return Face(*zip(low.tolist(), high.tolist(), strict=True))
 
     def expansion_load(self) -> sparse.csr_array:
         """Load (n_unknowns, n_corners) of a kelvin at each corner of the section's cells, N/K."""

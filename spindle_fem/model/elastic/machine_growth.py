@@ -19,7 +19,7 @@ from spindle_fem.definition.machine_spec import BearingSet, MachineSpec, SetBear
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.elastic.displacement_sensors import SensorSight, sensor_sights
-from spindle_fem.model.elastic.elastic_body import Face
+from spindle_fem.model.elastic.elastic_body import ElasticBody, Face
 from spindle_fem.model.elastic.growth_outputs import AXIAL, RADIAL, SIDEWAYS, BodyOutputs
 from spindle_fem.model.elastic.machine_bodies import MachineBodies, machine_bodies
 from spindle_fem.model.elastic.meridian_field import MeridianField
@@ -142,7 +142,8 @@ class GrowthModel:
         self.bodies = machine_bodies(spec) if bodies is None else bodies
 
         self._size = mesh.n_corners if order == 1 else len(mesh.points)
-        self.sights = sensor_sights(spec, mesh)
+        housing = self.bodies.bodies.get(self.bodies.housing)
+        self.sights = () if housing is None else sensor_sights(spec, mesh, housing)
         self.fields = {
             name: MeridianField(mesh, order, parts, self.bodies.bodies[name].section)
             for name, parts in self.bodies.parts.items()
@@ -201,16 +202,18 @@ class GrowthModel:
         return body.mean_shift(flange_back(layout), AXIAL) - at_bearing
 
     def _seen(self, name: str, sight: SensorSight) -> Array:
-        """Contribution of a body (shaft, or housing below it) to the reading of a sensor on the flange."""
+        """Contribution of a body (shaft, or housing below it) to the reading of a sensor."""
         body, held = self.bodies.bodies[name], self.holding_seat(name)
+        turning = name == self.bodies.shaft
         if not sight.axial:
-            spot = body.spot_shift(sight.z, sight.r, RADIAL) if name == self.bodies.shaft else None
-            return np.zeros(body.basis.N) if spot is None else spot
+            if turning:
+                return body.mean_shift(body.side_at(sight.z, sight.r), RADIAL)
+            return np.zeros(body.basis.N) if sight.mount is None else -body.mean_shift(sight.mount, RADIAL)
         at_bearing = body.mean_shift(held, AXIAL)
-        if name == self.bodies.shaft:
-            return sight.axial * (body.spot_shift(sight.z, sight.r, AXIAL) - at_bearing)
-        back = body.mean_shift(flange_back(Layout(self.spec, set())), AXIAL)
-        return sight.axial * (at_bearing - back)
+        if turning:
+            return sight.axial * (body.mean_shift(body.side_at(sight.z, sight.r), AXIAL) - at_bearing)
+        behind = flange_back(Layout(self.spec, set())) if sight.mount is None else sight.mount
+        return sight.axial * (at_bearing - body.mean_shift(behind, AXIAL))
 
     def displacements(self, temperature: Array, speed: float) -> dict[str, float]:
         """Reading of every displacement sensor since assembly, m, at a field [K] and a speed [rad/s]."""
@@ -233,19 +236,48 @@ class GrowthModel:
                     spins[index] = outputs.by_spin[place]
             if len(self.bending):
                 rows[index] += sight.of_axis(nose) @ self.bending
+                if sight.mount is not None and sight.angle is not None:
+                    rows[index] -= self._bent_mount(sight)
         return rows, spins
+
+    def _bent_mount(self, sight: SensorSight) -> Array:
+        """Shift of a sensor's holder along its direction where the housing bends, (n_unknowns,) m/K.
+
+        From the plane behind the flange; the holder is on the side on which the sensor looks.
+        """
+        body, (back, mount, turn) = self._bent_housing, self._frame
+        z, r = body.middle_of(sight.mount)
+        if sight.axial:
+            own = sight.axial * (body.mean_shift(sight.mount, (1.0, 0.0, 0.0)) + r * turn)
+        else:
+            own = body.mean_shift(sight.mount, (0.0, 1.0, 0.0)) - mount - turn * (z - back.z[0])
+        sides = self._bent_rows(BodyOutputs.of(body, {sight.key: own}))
+        return np.array([math.cos(sight.angle), math.sin(sight.angle)]) @ sides[0]
+
+    @cached_property
+    def _bent_housing(self) -> ElasticBody:
+        """The housing, its sections shifted sideways."""
+        return replace(self.bodies.bodies[self.bodies.housing], harmonic=1)
+
+    @cached_property
+    def _frame(self) -> tuple[Face, Array, Array]:
+        """The plane behind the flange; its shift sideways and its turn, outputs of the bent housing."""
+        body, back = self._bent_housing, flange_back(Layout(self.spec, set()))
+        square = 0.5 * (back.r[0] ** 2 + back.r[1] ** 2)
+        turn = -body.mean_shift(back, (1.0, 0.0, 0.0), lever=True) / square
+        return back, body.mean_shift(back, SIDEWAYS), turn
+
+    def _bent_rows(self, outputs: BodyOutputs) -> Array:
+        """Rows (k, 2, n_unknowns) of outputs of the bent housing, up and across each."""
+        field, shifts = self.fields[outputs.body.name], outputs.by_temperature()
+        return np.stack([field.rows(shifts, around) for around in ("up", "across")], axis=1)
 
     def _bending(self) -> Array:
         """Rows (4, n_unknowns): nose up, across; tilt up, across. Empty if they are not defined."""
         layout, sets = Layout(self.spec, set()), self.spec.bearing_set
         if len(sets) < 2 or not self.bodies.shaft or layout.flange_ends() is None:
             return np.zeros((0, self._size))
-        straight = self.bodies.bodies[self.bodies.housing]
-        body = replace(straight, harmonic=1)
-        back = flange_back(layout)
-        square = 0.5 * (back.r[0] ** 2 + back.r[1] ** 2)
-        mount = body.mean_shift(back, SIDEWAYS)
-        turn = -body.mean_shift(back, (1.0, 0.0, 0.0), lever=True) / square
+        body, (back, mount, turn) = self._bent_housing, self._frame
         places, shifts = [], []
         for group in (sets[0], sets[-1]):
             names = {bearing.name for bearing in group.bearing}
@@ -256,10 +288,7 @@ class GrowthModel:
         tilt = (shifts[1] - shifts[0]) / (places[1] - places[0])
         nose = min(segment.z[0] for segment in layout.shaft.segment)
         outputs = BodyOutputs.of(body, {"nose": shifts[0] + tilt * (nose - places[0]), "tilt": tilt})
-        up, across = (
-            self.fields[body.name].rows(outputs.by_temperature(), around) for around in ("up", "across")
-        )
-        return np.stack((up, across), axis=1).reshape(4, -1)
+        return self._bent_rows(outputs).reshape(4, -1)
 
     def holding_seat(self, carrier: str) -> Face | None:
         """Seat of the bearing that holds the shaft in place: the last of the set that carries thrust."""
