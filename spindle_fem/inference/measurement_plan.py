@@ -364,7 +364,7 @@ def _products(
     for index, coordinate in enumerate(belief.coordinates):
         if coordinate.name in moved:
             slopes[:, read:, index] += moved[coordinate.name]
-    slopes = np.concatenate((slopes * scale, _growth(told.states @ means.T, places, read)), axis=2)
+    slopes = np.concatenate((slopes * scale, _growth(predicted.states @ means.T, places, read)), axis=2)
     answers = BaseRun(predictor, number, values, places=means).responses(variants)
     own = [
         (item, white)
