@@ -393,18 +393,17 @@ def test_the_full_model_checks_displacements_in_micrometres(heated, monkeypatch)
     assert row["before_um"] == pytest.approx(0.01 * np.abs(away).max(), rel=1e-3)
     assert [item["channel"] for item in found["before"]["displacements"]] == ["S1"]
     assert kept["before"][0].shape == (RUN.size, 3)
-    noise = predictions_at_stamps(predictor, fit)
+    fast = predictions_at_stamps(predictor, fit)
+    warm, moved = channel_errors(predictor, fast), displacement_errors(predictor, fast)
+    total = {"train_rmse_K": 1.0, "heldout_rmse_K": 1.0}
     content = {
-        "mismatch": {
-            "channels": channel_errors(predictor, noise),
-            "displacements": displacement_errors(predictor, noise),
-        },
+        "mismatch": {"channels": warm, "displacements": moved},
         "fit": {
-            "before": {"train_rmse_K": 1.0, "heldout_rmse_K": 1.0},
-            "after": {"train_rmse_K": 1.0, "heldout_rmse_K": 1.0},
+            "before": total,
+            "after": total,
             "noise_K": 0.1,
-            "channels_after": channel_errors(predictor, noise),
-            "displacements_after": displacement_errors(predictor, noise),
+            "channels_after": warm,
+            "displacements_after": moved,
             "full_model": found,
         },
     }
