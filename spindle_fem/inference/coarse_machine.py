@@ -1,7 +1,8 @@
-"""A written network that cannot explain its own calibration recordings, and which structure would.
+"""A written network that cannot explain its own calibration recordings, and what would.
 
 Options are one more node behind a node, a link that the file lacks, a film that grows with the temperature
-difference. Each is fitted to most of the calibration's time and judged on the rest.
+difference, and a log of the inputs that ran on a clock of its own. Each is fitted to most of the
+calibration's time and judged on the rest.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spindle_fem.definition.effect_entries import EffectEntry
-from spindle_fem.definition.network_tables import LinkSpec, NetworkMachineSpec, NodeSpec
+from spindle_fem.definition.network_tables import LinkSpec, NodeSpec
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.outside_film_law import OutsideFilmEffect
 from spindle_fem.effects.registry import candidates_for, catalogue, definition_entry
@@ -22,6 +23,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.findings import candidate_values
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.input_clocks import other_clocks
 from spindle_fem.inference.input_sampling import left_over_noise
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.opened_machine import DiagnosedMachine, with_network
@@ -40,7 +42,7 @@ SHARE, SPREAD = 0.3, 1.2
 
 @dataclass(frozen=True, slots=True)
 class Addition:
-    """One piece of structure, with the residual on held-out time over the noise before and with it."""
+    """Structure or another clock, with what held-out time leaves over the noise before and with it."""
 
     statement: str
     left_before: float
@@ -57,10 +59,13 @@ class TooCoarse:
         What its calibration leaves of the readings over their noise.
     additions : tuple of Addition
         What helps, in order; empty where nothing of what was tried does.
+    left_with_them : float
+        What the calibration leaves with all additions.
     """
 
     left: float
     additions: tuple[Addition, ...]
+    left_with_them: float
 
     @property
     def statement(self) -> str:
@@ -70,7 +75,7 @@ class TooCoarse:
             f"{self.left:.1f} times their noise."
         )
         if not self.additions:
-            return f"{text} No further node, link or film that grows with the difference helps."
+            return f"{text} No further node, link, film that grows with the difference or clock helps."
         words = "; ".join(item.statement for item in self.additions)
         first, last = self.additions[0].left_before, self.additions[-1].left_after
         return f"{text} With {words} it leaves {last:.1f} instead of {first:.1f} on held-out time."
@@ -79,8 +84,10 @@ class TooCoarse:
 @dataclass(frozen=True, slots=True)
 class _Option:
     statement: str
-    spec: NetworkMachineSpec
+    machine: DiagnosedMachine
     candidates: tuple[Candidate, ...] = ()
+    # A wrong clock has misled the fit before: this one begins anew.
+    anew: bool = False
 
 
 def refined(machine: DiagnosedMachine) -> DiagnosedMachine:
@@ -88,25 +95,25 @@ def refined(machine: DiagnosedMachine) -> DiagnosedMachine:
     if not machine.is_network or not machine.calibration:
         return machine
     own, left, before = _fitted(machine)
+    remaining = left
     if left <= tuned.COARSE_LEFT:
         return machine
     additions: list[Addition] = []
     while len(additions) < MOST_ADDITIONS:
-        best: tuple[float, DiagnosedMachine, _Option, Fit] | None = None
+        best: tuple[float, float, DiagnosedMachine, _Option, Fit] | None = None
         for option in _options(machine):
             try:
-                opened = with_network(machine, option.spec)
-                fit, _, after = _fitted(opened, option.candidates, own)
+                fit, seen, after = _fitted(option.machine, option.candidates, None if option.anew else own)
             except SpindleFemError:
                 # It cannot be simulated: no help.
                 continue
             if best is None or after < best[0]:
-                best = after, _with_effects(opened, fit), option, fit
+                best = after, seen, _with_effects(option.machine, fit), option, fit
         if best is None or best[0] > (1.0 - LEAST_GAIN) * before:
             break
-        additions.append(Addition(best[2].statement, before, best[0]))
-        before, machine, _, own = best
-    return replace(machine, too_coarse=TooCoarse(left, tuple(additions)))
+        additions.append(Addition(best[3].statement, before, best[0]))
+        before, remaining, machine, _, own = best
+    return replace(machine, too_coarse=TooCoarse(left, tuple(additions), remaining))
 
 
 def _fitted(
@@ -159,8 +166,16 @@ def _with_effects(machine: DiagnosedMachine, fit: Fit) -> DiagnosedMachine:
 
 
 def _options(machine: DiagnosedMachine) -> Iterator[_Option]:
-    """Further nodes, links and laws, one at a time."""
+    """Other clocks, further nodes, links and laws, one at a time."""
+    for statement, timed in other_clocks(machine):
+        yield _Option(statement, timed, anew=True)
     spec, network = machine.spec, machine.spec.network
+
+    def grown(node: NodeSpec | None, link: LinkSpec) -> DiagnosedMachine:
+        nodes = network.node if node is None else (*network.node, node)
+        own = network.model_copy(update={"node": nodes, "link": (*network.link, link)})
+        return with_network(machine, spec.model_copy(update={"network": own}))
+
     names = [node.name for node in network.node]
     joined = {frozenset(link.between) for link in network.link}
     at: dict[str, float] = {}
@@ -174,8 +189,7 @@ def _options(machine: DiagnosedMachine) -> Iterator[_Option]:
         if usual > 0.0:
             yield _Option(
                 f"one more node behind {node.name}",
-                _grown(
-                    spec,
+                grown(
                     NodeSpec(name=new, capacity=Uncertain(SHARE * node.capacity.value, SPREAD)),
                     LinkSpec(between=(node.name, new), conductance=Uncertain(usual, SPREAD)),
                 ),
@@ -186,18 +200,10 @@ def _options(machine: DiagnosedMachine) -> Iterator[_Option]:
             usual = SHARE * min(at.get(end, np.inf) for end in pair)
             if np.isfinite(usual) and usual > 0.0:
                 link = LinkSpec(between=pair, conductance=Uncertain(usual, SPREAD))
-                yield _Option(f"a link from {pair[0]} to {pair[1]}", _grown(spec, None, link))
+                yield _Option(f"a link from {pair[0]} to {pair[1]}", grown(None, link))
     present = {(entry.effect, entry.component) for entry in spec.effects}
     for candidate in candidates_for(machine.view):
         grows = isinstance(catalogue()[candidate.effect], OutsideFilmEffect)
         if grows and (candidate.effect, candidate.component) not in present:
             law = candidate.effect.replace("_", " ")
-            yield _Option(f"{law} on {candidate.component}", spec, (candidate,))
-
-
-def _grown(spec: NetworkMachineSpec, node: NodeSpec | None, link: LinkSpec) -> NetworkMachineSpec:
-    network = spec.network
-    nodes = network.node if node is None else (*network.node, node)
-    return spec.model_copy(
-        update={"network": network.model_copy(update={"node": nodes, "link": (*network.link, link)})}
-    )
+            yield _Option(f"{law} on {candidate.component}", machine, (candidate,))

@@ -22,6 +22,7 @@ from spindle_fem.inference.misdescription_content import misdescription_content
 from spindle_fem.inference.mismatch_place import where_of
 from spindle_fem.inference.missing_heat import stretches
 from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.verdict import Judgement
 from spindle_fem.results.run_summary import package_versions
 
 SCHEMA = "spindle-fem/diagnosis/1"
@@ -49,7 +50,7 @@ def diagnosis_content(
         "machine": opened.name,
         "recordings": [recording.name for recording in predictor.recordings],
         "verdict": judgement.verdict,
-        "reason": " ".join(filter(None, (_too_coarse(opened), judgement.reason))),
+        "reason": " ".join(filter(None, _reasons(opened, judgement))),
         "machine_too_coarse": None if opened.too_coarse is None else asdict(opened.too_coarse),
         "mismatch": {
             "detected": judgement.verdict != "consistent",
@@ -100,8 +101,20 @@ def _told(diagnosis: Diagnosis) -> dict[str, float]:
     return {"heldout_states_told_rmse_K": rmse(diagnosis.predictor, predicted, heldout=True)}
 
 
-def _too_coarse(opened: DiagnosedMachine) -> str:
-    return "" if opened.too_coarse is None else opened.too_coarse.statement
+def _reasons(opened: DiagnosedMachine, judgement: Judgement) -> tuple[str, ...]:
+    """Why the verdict is what it is, sentence by sentence."""
+    coarse = opened.too_coarse
+    if coarse is None:
+        return (judgement.reason,)
+    unexplained = judgement.verdict == "unexplained" and not judgement.chosen.fit.candidates
+    if not unexplained or judgement.left > coarse.left_with_them:
+        return coarse.statement, judgement.reason
+    return (
+        coarse.statement,
+        judgement.reason + ".",
+        f"Its calibration leaves {coarse.left_with_them:.1f} times: nothing says that the machine has "
+        "changed since.",
+    )
 
 
 def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, float]:

@@ -65,6 +65,8 @@ class Judgement:
         Share of its gain that no set with fewer effects has.
     gain_of_more : float
         What the best set with more effects gains beyond it.
+    left : float
+        What the chosen set leaves of the readings over their noise; 0 where that was not asked.
     """
 
     verdict: Verdict
@@ -76,6 +78,7 @@ class Judgement:
     evidence: float = 1.0
     share_of_last: float = 1.0
     gain_of_more: float = 0.0
+    left: float = 0.0
 
 
 def rank(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[Ranked]:
@@ -278,16 +281,16 @@ def judge(
         or not (chosen.fit.candidates and improved)
         or within_prior(chosen.fit, calibrated)
     ):
-        nothing_left = left(empty.fit)
-        much_left = (
-            np.sqrt(empty.fit.reduced_misfit) > tuned.UNEXPLAINED_MISFIT or nothing_left > tuned.MOST_LEFT
-        )
+        nothing_left, misfit_left = left(empty.fit), float(np.sqrt(empty.fit.reduced_misfit))
+        much_left = misfit_left > tuned.UNEXPLAINED_MISFIT or nothing_left > tuned.MOST_LEFT
         if not much_left or (nothing_left <= tuned.MOST_LEFT and within_prior(chosen.fit, calibrated)):
             return Judgement("consistent", p_value, empty, (), 0.0, "")
         # The residual is there, and no set of the catalogue makes it likelier.
         left_over = float(chi2.sf(empty.fit.misfit, len(empty.fit.residual)))
-        reason = "the readings differ from the model by more than the noise, and no effect explains it"
-        return Judgement("unexplained", left_over, replace(empty, probability=0.0), (), 1.0, reason)
+        much = f"{nothing_left:.1f} times" if nothing_left > tuned.MOST_LEFT else "more than"
+        reason = f"the readings differ from the model by {much} the noise, and no effect explains it"
+        nothing_found = replace(empty, probability=0.0)
+        return Judgement("unexplained", left_over, nothing_found, (), 1.0, reason, left=nothing_left)
     misfit = float(np.sqrt(chosen.fit.reduced_misfit))
     inexact = float(np.clip((misfit - tuned.EXACT_MISFIT) / tuned.OTHER_RANGE, 0.0, tuned.LARGEST_OTHER))
     rest = left(chosen.fit)
@@ -344,6 +347,7 @@ def judge(
         evidence,
         share,
         more,
+        rest,
     )
 
 

@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ import pytest
 from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.inference import coarse_machine, tuned
 from spindle_fem.inference.coarse_machine import Addition, TooCoarse, refined
+from spindle_fem.inference.input_clocks import other_clocks, with_input_rate
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.network_misdescriptions import (
@@ -74,9 +76,9 @@ TIMES = np.arange(0.0, 9000.0, 10.0)
 LOAD = np.where((TIMES // 1500.0) % 2 == 0, 80.0, 20.0)
 
 
-def recorded(folder, plate):
+def recorded(folder, plate, load=LOAD):
     folder.mkdir(parents=True, exist_ok=True)
-    table = pd.DataFrame({"time_s": TIMES, "plate": plate, "load": LOAD})
+    table = pd.DataFrame({"time_s": TIMES, "plate": plate, "load": load})
     table.to_csv(folder / "run.csv", index=False)
     (folder / "run.toml").write_text(RECORDING)
     return read_recording(folder / "run.toml")
@@ -165,7 +167,48 @@ def test_a_machine_without_its_core_is_too_coarse_and_offered_one(tmp_path, blan
     assert refined(better).too_coarse == better.too_coarse
 
 
+def hurried(values, rate):
+    """A log of the load that runs faster than the temperatures' clock from its first change on."""
+    start = TIMES[np.argmax(values != values[0])]
+    return np.interp(np.where(start < TIMES, start + (TIMES - start) * rate, TIMES), TIMES, values)
+
+
+def test_an_input_is_stretched_from_where_it_first_changes(tmp_path, blank):
+    quick = recorded(tmp_path, np.full(TIMES.size, 21.0), hurried(LOAD, 1.25))
+    back = with_input_rate(quick, ["load"], 1.25)
+    assert np.abs(back.inputs - blank.inputs).max(axis=1)[TIMES < 7000.0] == pytest.approx(0.0, abs=1e-12)
+    assert with_input_rate(quick, ["other"], 1.25).inputs == pytest.approx(quick.inputs)
+
+
+@pytest.fixture(scope="module")
+def timed(tmp_path_factory, blank):
+    """A machine calibrated by a good recording and by one whose load was logged too fast."""
+    folder = tmp_path_factory.mktemp("timed")
+    plate = told(blank, MACHINE) - 273.15 + np.random.default_rng(3).normal(0.0, 0.05, TIMES.size)
+    good, quick = recorded(folder / "good", plate), recorded(folder / "quick", plate, hurried(LOAD, 1.15))
+    (folder / "rig.toml").write_text(MACHINE)
+    return open_machine(folder / "rig.toml", (), [good], [good, quick])
+
+
+def test_inputs_on_a_clock_of_their_own_are_found(timed):
+    *_, (statement, right) = other_clocks(timed)
+    assert "inputs of run stretched 1.15 times" in statement
+    good, quick = right.calibration
+    late = TIMES < 7500.0
+    assert np.mean(good.inputs[late] != quick.inputs[late]) < 0.02
+    assert np.mean(good.inputs[late] != timed.calibration[1].inputs[late]) > 0.05
+
+
+@pytest.mark.slow
+def test_a_calibration_whose_inputs_have_a_clock_of_their_own_is_put_right(timed):
+    better = refined(timed)
+    first = better.too_coarse.additions[0]
+    assert "inputs of run stretched 1.15 times" in first.statement
+    assert first.left_after < 0.5 * first.left_before
+    assert refined(replace(timed, calibration=timed.calibration[:1])).too_coarse is None
+
+
 def test_what_nothing_helps_is_said(monkeypatch):
-    assert "No further node" in TooCoarse(3.0, ()).statement
-    assert "instead of 4.0" in TooCoarse(3.0, (Addition("a link", 4.0, 2.0),)).statement
+    assert "No further node" in TooCoarse(3.0, (), 3.0).statement
+    assert "instead of 4.0" in TooCoarse(3.0, (Addition("a link", 4.0, 2.0),), 1.8).statement
     assert coarse_machine.LEAST_GAIN < 1.0
