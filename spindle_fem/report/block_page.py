@@ -22,7 +22,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from spindle_fem import __version__
-from spindle_fem.report.figure_style import PNG_LEVEL, rasterise
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -155,7 +154,10 @@ def illustration_of(picture: Figure | Image | Path, caption: str, alt: str = "")
     Pictures in true colour become WebP, at this quality a fifth of the PNG, which stays the original.
     Charts with a palette are smaller as PNG, and sharp.
     """
+    # loaded here: pages are read by processes that draw nothing
     from PIL import Image
+
+    from spindle_fem.report.figure_style import PNG_LEVEL, rasterise
 
     if hasattr(picture, "canvas"):
         image = Image.fromarray(rasterise(picture))

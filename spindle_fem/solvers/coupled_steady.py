@@ -195,7 +195,9 @@ class _Operation:
         self.loads, self.coolant = machine.builder.at(self.point, machine.field_state(field, lumped), physics)
         self.solution = solve_steady(
             machine.problem(self.loads),
-            guess=self.solution,
+            guess=None
+            if self.solution is None
+            else replace(self.solution, temperature=field, lumped_temperature=state[n:]),
             preconditioner=None if self.solution is None else self.solution.preconditioner,
             relative_tolerance=_linear_tolerance(self.change),
         )

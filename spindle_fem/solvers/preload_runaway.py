@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from spindle_fem.errors import NoSteadyStateError
 from spindle_fem.model.mesh.column_solver import solve_many
 from spindle_fem.model.mesh.equations import assemble_system
+from spindle_fem.model.mesh.linear_system import ThermalSystem
 from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady, split_unknowns
 from spindle_fem.operation.bearing_heat import BearingTemperatures
 from spindle_fem.operation.coefficients import ball_conductances
@@ -31,6 +32,10 @@ SLOWEST = 0.05
 # Tolerance of a watt's effect on the machine, in the energy norm; it moves the fold by 3e-5 of its speed.
 RESPONSE_TOLERANCE = 1.0e-3
 RESPONSE_PRECISION = np.float32
+# Difference of two spreads over rings, as a share, that is round-off of that precision.
+SAME_SPREAD = 1.0e-5
+
+Array = NDArray[np.float64]
 
 
 def no_equilibrium(name: str, point: OperatingPoint, reason: str) -> NoSteadyStateError:
@@ -90,7 +95,8 @@ class HeatResponse:
         solved = solved or solve_steady(problem)
         system = assemble_system(problem)
         tied = system.tied()
-        entering = np.zeros((len(tied.full_load()), 3 * len(self.names)), RESPONSE_PRECISION)
+        count = 3 * len(self.names)
+        entering = np.zeros((len(tied.full_load()), count), RESPONSE_PRECISION)
         nodes = len(tied.load)
         for index, name in enumerate(self.names):
             for body, ring in enumerate(("inner", "outer")):
@@ -101,14 +107,20 @@ class HeatResponse:
                 entering[:nodes, 3 * index + body] = watt if system.tie is None else system.tie.T @ watt
             balls = [problem.lumped_names.index(node) for node in builder.ball_nodes(name)]
             entering[[nodes + ball for ball in balls], 3 * index + 2] = 1.0 / len(balls)
-        warmed = solve_many(
+        passed_on = _passed_on(tied, entering)
+        solved_for = np.setdiff1d(np.arange(count), list(passed_on))
+        warmed = np.zeros_like(entering)
+        warmed[:, solved_for] = solve_many(
             tied.full_matrix().astype(RESPONSE_PRECISION),
-            entering,
+            entering[:, solved_for],
             solved.preconditioner,
             relative_tolerance=RESPONSE_TOLERANCE,
         )
+        for column, (shares, warmer) in passed_on.items():
+            warmed[:, column] = warmed[:, column - 2 : column] @ shares
+            warmed[nodes:, column] += warmer
 
-        def around(field: NDArray[np.float64], lumped: NDArray[np.float64]) -> NDArray[np.float64]:
+        def around(field: Array, lumped: Array) -> Array:
             known = dict(zip(problem.lumped_names, lumped.tolist(), strict=True))
             found = builder.bearing_temperatures(machine.field_state(field, known))
             return np.array([found[name].state for name in self.names])
@@ -123,7 +135,7 @@ class HeatResponse:
         self.unheated = heated - self.per_watt @ entered
 
     def temperatures(
-        self, heat: NDArray[np.float64], conductance: NDArray[np.float64]
+        self, heat: Array, conductance: Array
     ) -> dict[str, BearingTemperatures]:
         """Temperatures at heats (n_bearings,) [W] and conductances of the balls (n_bearings, 2) [W/K]."""
         entering = (heat[:, None] * self._shares).ravel()
@@ -141,14 +153,14 @@ class HeatResponse:
         values = values + self.per_watt @ (flows @ flow)
         return {name: BearingTemperatures.of_state(row) for name, row in zip(self.names, values, strict=True)}
 
-    def state(self, heats: Mapping[str, BearingHeat]) -> NDArray[np.float64]:
+    def state(self, heats: Mapping[str, BearingHeat]) -> Array:
         """Heats and conductances of the balls, as one state (3 n_bearings,)."""
         conductances = [
             ball_conductances(group, heats[bearing.name]) for group, bearing in self.machine.spec.bearings
         ]
         return np.append([heats[name].total for name in self.names], conductances)
 
-    def respond(self, states: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
+    def respond(self, states: Array, speed: float) -> Array:
         """The states (n, 3 n_bearings) that the temperatures of states make at a speed (rad/s)."""
         count = len(self.names)
         around = [self.temperatures(state[:count], state[count:].reshape(count, 2)) for state in states]
@@ -158,7 +170,7 @@ class HeatResponse:
         conductance[:, self._constant] = self._base[self._constant]
         return np.hstack([heat, conductance.reshape(len(states), -1)])
 
-    def follow(self, state: NDArray[np.float64], start: float, end: float) -> Branch:
+    def follow(self, state: Array, start: float, end: float) -> Branch:
         """The branch from a state at a speed ``start`` (rad/s)."""
         return follow_branch(self.respond, state, start, end, weak=2 * len(self.names))
 
@@ -173,6 +185,25 @@ class HeatResponse:
         start = SLOWEST * end
         cold = np.append(np.zeros(len(self.names)), self._base)
         return self.follow(self.respond(cold[None], start)[0], start, end)
+
+
+def _passed_on(system: ThermalSystem, entering: Array) -> dict[int, tuple[Array, Array]]:
+    """Watts into balls that meet their rings evenly: shares of the rings, and how much warmer they are alone.
+
+    Balls pass on all that they are given, so that what they do is what watts into both rings do, which are
+    the two columns before. Balls in sectors are not found here: their sectors have areas of their own.
+    """
+    found = {}
+    nodes = len(system.load)
+    for column in range(2, entering.shape[1], 3):
+        warmer = np.linalg.solve(system.lumped_matrix, entering[nodes:, column])
+        given = system.exchange @ warmer
+        rings = entering[:nodes, column - 2 : column].astype(float)
+        own = np.flatnonzero(given)
+        shares = np.linalg.lstsq(rings[own], given[own])[0]
+        if np.abs(rings @ shares - given).max() < SAME_SPREAD * given.max():
+            found[column] = shares.astype(entering.dtype), warmer.astype(entering.dtype)
+    return found
 
 
 def equilibria_above(

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 Respond = Callable[[Array, float], Array]
 # Largest residual of ln x at a point of the branch.
 TOLERANCE = 1.0e-6
+# The same of points that only lead on.
+ON_THE_WAY = 1.0e-4
 DIFFERENCE = 1.0e-4
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.3, 1.0, 1.0e-3
 MOST_CORRECTIONS = 8
@@ -91,6 +93,8 @@ class _Walk:
     def __init__(self, respond: Respond, end: float, weak: int) -> None:
         self.respond, self.end, self.weak = respond, end, weak
         self.jacobian: Array | None = None
+        # of the last point reached
+        self.left: Array = np.empty(0)
 
     def residual(self, point: Array) -> Array:
         """Residual of ln x = ln G, (k,)."""
@@ -111,11 +115,12 @@ class _Walk:
         further = np.append(point[:-1], point[-1] + DIFFERENCE)
         self.jacobian[:, size] = (self.residual(further) - residual) / DIFFERENCE
 
-    def correct(self, guess: Array, across: Array) -> tuple[Array, int]:
+    def correct(self, guess: Array, across: Array, tolerance: float = TOLERANCE) -> tuple[Array, int]:
         """The point of the branch in the plane through a guess, and how many corrections it took."""
         point, residual = guess, self.residual(guess)
         for count in range(MOST_CORRECTIONS):
-            if np.abs(residual).max() < TOLERANCE:
+            if np.abs(residual).max() < tolerance:
+                self.left = residual
                 return point, count
             if count == MOST_CORRECTIONS // 2:
                 self.differentiate(point, residual)
@@ -158,7 +163,7 @@ class _Walk:
                     step *= 0.5
                     continue
             try:
-                point, count = self.correct(points[-1] + step * tangent, tangent)
+                point, count = self.correct(points[-1] + step * tangent, tangent, ON_THE_WAY)
             except (_NoPointError, SpindleFemError) as error:
                 reason, step = str(error), 0.5 * step
                 continue
@@ -166,14 +171,14 @@ class _Walk:
             if point[-1] < points[-2][-1]:
                 return self.branch(points, "fold", self.fold(points))
             if count >= REFRESHED_FROM:
-                self.differentiate(point, self.residual(point))
+                self.differentiate(point, self.left)
             tangent = self.tangent(points[-1] - points[-2])
             step = min(LONGEST_STEP, step * (1.5 if count <= 3 else 0.7))
         return self.branch(points, "refused", max(point[-1] for point in points), reason)
 
     def fold(self, points: list[Array]) -> float:
-        """Largest parameter of the parabola through the last points, with one more on it until it stays."""
-        near = points[-3:]
+        """Largest parameter: points are added where the parabola of three has its top, until it foretells them."""
+        near = [self.nearer(point, self.tangent(points[-1] - points[-2])) for point in points[-3:]]
         if len(near) == 2:
             along = near[1] - near[0]
             try:
@@ -186,22 +191,29 @@ class _Walk:
             along = near[-1] - near[0]
             along = along / np.linalg.norm(along)
             places = np.array([along @ (point - near[0]) for point in near])
-            square, slope, _ = np.polyfit(places, [point[-1] for point in near], 2)
-            if not square < 0.0:
+            parabola = np.polyfit(places, [point[-1] for point in near], 2)
+            if not parabola[0] < 0.0:
                 break
-            place = float(np.clip(-0.5 * slope / square, places[0], places[-1]))
+            place = float(np.clip(-0.5 * parabola[1] / parabola[0], places[0], places[-1]))
             share = np.array([np.interp(place, places, column) for column in np.array(near).T])
             try:
                 top, _ = self.correct(share + (place - along @ (share - near[0])) * along, along)
             except (_NoPointError, SpindleFemError):
                 break
-            before, best = best, max(best, top[-1])
+            best = max(best, top[-1])
             near = sorted([*near, top], key=lambda point: float(along @ (point - near[0])))
             peak = int(np.clip(max(range(4), key=lambda i: near[i][-1]), 1, 2))
             near = near[peak - 1 : peak + 2]
-            if abs(best - before) < FOLD_TOLERANCE * best:
+            if abs(top[-1] - np.polyval(parabola, place)) < FOLD_TOLERANCE * best:
                 break
         return float(best)
+
+    def nearer(self, point: Array, along: Array) -> Array:
+        """A point that only led on, as near to the branch as others; itself where that fails."""
+        try:
+            return self.correct(point, along)[0]
+        except (_NoPointError, SpindleFemError):
+            return point
 
     def branch(
         self, points: list[Array], end: Literal["fold", "end", "refused"], limit: float, reason: str = ""

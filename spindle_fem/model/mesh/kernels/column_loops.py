@@ -13,26 +13,32 @@ from spindle_fem.model.mesh.kernels.multigrid_loops import WIDTH
 def multiply_columns(low, high, starts, columns, values, vectors, out):
     """``out = A vectors`` on a range of rows."""
     m = out.shape[1]
+    sums = np.empty(m, dtype=out.dtype)
     for i in range(low, high):
         for c in range(m):
-            out[i, c] = 0.0
+            sums[c] = 0.0
         for place in range(starts[i], starts[i + 1]):
             j, value = columns[place], values[place]
             for c in range(m):
-                out[i, c] += value * vectors[j, c]
+                sums[c] += value * vectors[j, c]
+        for c in range(m):
+            out[i, c] = sums[c]
 
 
 @njit(**FAST)
 def left_over(low, high, starts, columns, values, right, vectors, out):
     """``out = right − A vectors`` on a range of rows."""
     m = out.shape[1]
+    sums = np.empty(m, dtype=out.dtype)
     for i in range(low, high):
         for c in range(m):
-            out[i, c] = right[i, c]
+            sums[c] = right[i, c]
         for place in range(starts[i], starts[i + 1]):
             j, value = columns[place], values[place]
             for c in range(m):
-                out[i, c] -= value * vectors[j, c]
+                sums[c] -= value * vectors[j, c]
+        for c in range(m):
+            out[i, c] = sums[c]
 
 
 @njit(**FAST)
