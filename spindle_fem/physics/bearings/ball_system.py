@@ -326,13 +326,12 @@ def solve_bordered(
     lever = np.maximum(np.abs(system.axial_map).max(axis=0), np.abs(system.radial_map).max(axis=0))
     x, q = unknowns.copy(), displacement.copy()
     current = evaluate(x, *system.groove_distances(q))
-    ring = _ring_residual(system, current, load, q)
+    ring, fall = _ring_residual(system, current, load, q)
     merit = _merit(current, ring, row_scale, load_scale)
     iterations, fresh = 0, True
-    tangent = _tangent(system, current, q)[0]
     while iterations < _MOST_ITERATIONS and merit > tolerance:
         iterations += 1
-        tangent, solved_residual, solved_distance = _tangent(system, current, q)
+        tangent, solved_residual, solved_distance = _tangent(system, current, fall)
         if len(q):
             p = x.shape[1]
             force_change = -np.einsum("nij,nj->ni", current.by_unknown[:, p:, :], solved_residual)
@@ -353,7 +352,7 @@ def solve_bordered(
         for _ in range(9):
             trial_q = q + fraction * step_q
             trial = evaluate(x + fraction * step_x, *system.groove_distances(trial_q))
-            trial_ring = _ring_residual(system, trial, load, trial_q)
+            trial_ring, trial_fall = _ring_residual(system, trial, load, trial_q)
             trial_merit = _merit(trial, trial_ring, row_scale, load_scale)
             if trial_merit < merit * (1.0 - 1e-3 * fraction):
                 fresh = True
@@ -362,8 +361,8 @@ def solve_bordered(
         if not fresh:
             break
         x, q = x + fraction * step_x, q + fraction * step_q
-        current, ring, merit = trial, trial_ring, trial_merit
-    tangent = _tangent(system, current, q)[0]
+        current, ring, fall, merit = trial, trial_ring, trial_fall, trial_merit
+    tangent = _tangent(system, current, fall)[0]
     return BorderedSolution(x, q, merit, bool(merit < max(_ACCEPTED, tolerance)), iterations, tangent)
 
 
@@ -380,12 +379,15 @@ def _solve_rings(tangent: FloatArray, right: FloatArray) -> FloatArray:
 
 def _ring_residual(
     system: BallSystem, evaluation: Evaluation, load: FloatArray, displacement: FloatArray
-) -> FloatArray:
+) -> tuple[FloatArray, FloatArray | None]:
+    """Forces on the rings that are not in balance, and how those of rings that give way fall."""
     weighted = system.weight[:, None] * evaluation.ring_force
     residual = system.axial_map.T @ weighted[:, 0] + system.radial_map.T @ weighted[:, 1] - load
-    if system.rings is not None:
-        residual[system.rings.columns] -= system.rings.force(displacement)[0]
-    return residual
+    if system.rings is None:
+        return residual, None
+    force, fall = system.rings.force(displacement)
+    residual[system.rings.columns] -= force
+    return residual, fall
 
 
 def _merit(evaluation: Evaluation, ring: FloatArray, row_scale: FloatArray, load_scale: FloatArray) -> float:
@@ -397,7 +399,7 @@ def _merit(evaluation: Evaluation, ring: FloatArray, row_scale: FloatArray, load
 
 
 def _tangent(
-    system: BallSystem, evaluation: Evaluation, displacement: FloatArray
+    system: BallSystem, evaluation: Evaluation, fall: FloatArray | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Ring stiffness with the balls eliminated, and J_xx⁻¹R, J_xx⁻¹J_xA of every ball."""
     p = evaluation.residual.shape[1]
@@ -418,5 +420,5 @@ def _tangent(
     tangent = np.einsum("n,nia,nij,njb->ab", system.weight, maps, stiffness, maps)
     if system.rings is not None:
         columns = system.rings.columns
-        tangent[np.ix_(columns, columns)] += system.rings.force(displacement)[1]
+        tangent[np.ix_(columns, columns)] += fall
     return tangent, solved_residual, solved_distance
