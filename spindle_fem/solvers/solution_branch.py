@@ -177,7 +177,7 @@ class _Walk:
         return self.branch(points, "refused", max(point[-1] for point in points), reason)
 
     def fold(self, points: list[Array]) -> float:
-        """Largest parameter: points are added where the parabola of three has its top, until it foretells them."""
+        """Largest parameter: points are added at the top of the parabola of three until it foretells them."""
         near = [self.nearer(point, self.tangent(points[-1] - points[-2])) for point in points[-3:]]
         if len(near) == 2:
             along = near[1] - near[0]

@@ -133,7 +133,7 @@ class SeatBodies:
     by_force : (2k, k) ndarray, [m/N]
     areas : (2k,) ndarray, [m²]
     by_pressure : (k, 2k) ndarray, [m/Pa]
-        Opening of the seats by pressures and by radial ball forces, growth by pressures: see :class:`SeatedLaw`.
+        Openings by pressures and by radial ball forces, growth by pressures: see :class:`SeatedLaw`.
     by_load : (k, 2) ndarray, [m/N]
         How far a newton of radial ball force moves the inner raceway inwards and the outer one outwards.
     spin_opening : (2k,) ndarray, [m s²]
