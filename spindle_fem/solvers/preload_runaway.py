@@ -134,9 +134,7 @@ class HeatResponse:
         entered = [loads.heat_to[name][body] for name in self.names for body in ("inner", "outer", "balls")]
         self.unheated = heated - self.per_watt @ entered
 
-    def temperatures(
-        self, heat: Array, conductance: Array
-    ) -> dict[str, BearingTemperatures]:
+    def temperatures(self, heat: Array, conductance: Array) -> dict[str, BearingTemperatures]:
         """Temperatures at heats (n_bearings,) [W] and conductances of the balls (n_bearings, 2) [W/K]."""
         entering = (heat[:, None] * self._shares).ravel()
         values = self.unheated + self.per_watt @ entering
