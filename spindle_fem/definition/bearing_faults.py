@@ -45,6 +45,7 @@ def bearing_faults(
             yield from _roller_set_faults(group)
         else:
             yield from _ball_set_faults(group)
+            yield from _springs_and_thrust(group)
             if group.fit is not None:
                 yield from seat_faults(spec, group)
     carriers = [group.name for group in spec.bearing_set if group.carries_thrust]
@@ -107,6 +108,16 @@ def _ball_set_faults(group: BearingSet) -> Iterator[SpindleFemError]:
                 "is missing.",
                 "Allowed: towards_rear, towards_nose.",
             )
+
+
+def _springs_and_thrust(group: BearingSet) -> Iterator[SpindleFemError]:
+    if group.carries_thrust and group.spring_force:
+        yield SpecError(
+            f"bearing_set.{group.name}.carries_thrust",
+            "its bearings all face one way, on springs, which give way to thrust.",
+            "Another set must hold the shaft; bearings at both ends that load each other are one set, where "
+            "each may have a bearing_type of its own.",
+        )
 
 
 def _roller_set_faults(group: BearingSet) -> Iterator[SpindleFemError]:

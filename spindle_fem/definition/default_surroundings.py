@@ -99,9 +99,9 @@ def _drawn(content: Mapping[str, Any]) -> _Drawn | None:
     for group in groups if isinstance(groups, list) else ():
         if not isinstance(group, Mapping):
             continue
-        named = types.get(str(group.get("bearing_type"))) if isinstance(types, Mapping) else None
-        for kind in _sound(BearingType, [named]):
-            for bearing in _sound(SetBearing, group.get("bearing")):
+        for bearing in _sound(SetBearing, group.get("bearing")):
+            name = str(bearing.bearing_type or group.get("bearing_type"))
+            for kind in _sound(BearingType, [types.get(name) if isinstance(types, Mapping) else None]):
                 parts += ring_geometries(bearing, kind)
                 surfaces += map(surface_definition, raceway_surfaces(bearing.name))
     names = [part.name for part in parts]

@@ -332,6 +332,14 @@ class MachineSpec(SpecModel):
         """Every bearing with its set, in file order."""
         return tuple((group, bearing) for group in self.bearing_set for bearing in group.bearing)
 
+    def axial_load(self, group: BearingSet, thrust: float) -> float:
+        """External axial force on a set, N, at a thrust on the shaft [N]; both positive towards the rear."""
+        if group.spring_force:
+            return -group.spring_force
+        if not group.carries_thrust:
+            return 0.0
+        return thrust + sum(other.spring_force for other in self.bearing_set)
+
     @property
     def follows_preload(self) -> bool:
         """Whether expansion changes the preload of its bearings, and with it their heat."""

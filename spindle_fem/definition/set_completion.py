@@ -33,7 +33,7 @@ def add_set_rules(content: dict[str, Any]) -> Iterator[tuple[str, str]]:
         kind = types.get(str(group.get("bearing_type")))
         if isinstance(kind, Mapping):
             yield from _preload(groups, position, kind)
-            yield from _spacers(content, group, kind)
+            yield from _spacers(content, group, types)
         elif str(group.get("preload")) in PRELOAD_CLASSES:
             # An unknown type is the one fault: its bearings have some preload.
             groups[position] = {**group, "preload": "0 N"}
@@ -57,9 +57,15 @@ def _preload(groups: list[Any], position: int, kind: Mapping[str, Any]) -> Itera
     if sum(numbers) < len(sides):
         # A direction that is missing or unknown is the one fault: its set has some preload.
         groups[position] = {**group, "preload": "0 N"}
-    if not all(numbers) or sum(numbers) < len(sides):
+    if not any(numbers) or sum(numbers) < len(sides):
         return
-    force = own * tandem_factor(*numbers)
+    if all(numbers):
+        force = own * tandem_factor(*numbers)
+    elif group.get("preload_kind") == "spring":
+        # each bearing as in a pair
+        force = own * sum(numbers)
+    else:
+        return
     groups[position] = {**group, "preload": f"{force:.4g} N"}
     yield (
         f"bearing_set.{group.get('name')}.preload",
@@ -83,9 +89,9 @@ def tandem_factor(towards_rear: int, towards_nose: int) -> float:
 
 
 def _spacers(
-    content: dict[str, Any], group: Mapping[str, Any], kind: Mapping[str, Any]
+    content: dict[str, Any], group: Mapping[str, Any], types: Mapping[str, Any]
 ) -> Iterator[tuple[str, str]]:
-    """Rings between bearings with gaps, as high as the bearing's rings."""
+    """Rings between bearings of one type with gaps, as high as the bearing's rings."""
     material = group.get("spacers")
     rows, parts = group.get("bearing"), content.get("part")
     if not isinstance(rows, list) or not isinstance(parts, list):
@@ -93,13 +99,14 @@ def _spacers(
     if not is_known_material(material, content.get("materials")):
         return
     with contextlib.suppress(SpindleFemError, TypeError, ValueError, AttributeError, KeyError):
-        gaps = _gaps([row["z"] for row in rows])
+        named = [str(row.get("bearing_type") or group["bearing_type"]) for row in rows]
+        gaps = _gaps([row["z"] for row in rows], named)
         known = {part.get("name") for part in parts if isinstance(part, Mapping)}
         rings = {
             "inner_spacer": ("bore_diameter", "inner_ring_outer_diameter"),
             "outer_spacer": ("outer_ring_inner_diameter", "outer_diameter"),
         }
-        for number, (low, high) in enumerate(gaps, start=1):
+        for number, (low, high, own) in enumerate(gaps, start=1):
             for ring, (inner, outer) in rings.items():
                 name = f"{group['name']}_{ring}" + (f"_{number}" if len(gaps) > 1 else "")
                 if name in known:
@@ -108,8 +115,8 @@ def _spacers(
                     "marks": "A",
                     "name": "ring",
                     "z": [_millimetres(low), _millimetres(high)],
-                    "inner_diameter": kind[inner],
-                    "outer_diameter": kind[outer],
+                    "inner_diameter": types[own][inner],
+                    "outer_diameter": types[own][outer],
                 }
                 turning = ring == "inner_spacer"
                 part = {"name": name, "material": material, "rotating": turning, "segment": [segment]}
@@ -127,10 +134,17 @@ def is_known_material(name: Any, given: Any) -> bool:
     return isinstance(name, str) and (name in own or name in MATERIALS)
 
 
-def _gaps(places: list[Any]) -> list[tuple[float, float]]:
-    """Gaps between neighbouring bearings, m."""
-    spans = sorted(tuple(to_si(end, "m", where="") for end in place) for place in places)
-    return [(before[1], after[0]) for before, after in pairwise(spans) if after[0] - before[1] > _SAME_PLACE]
+def _gaps(places: list[Any], named: list[str]) -> list[tuple[float, float, str]]:
+    """Gaps between neighbouring bearings of one type, m, with its name."""
+    spans = sorted(
+        (*(to_si(end, "m", where="") for end in place), name)
+        for place, name in zip(places, named, strict=True)
+    )
+    return [
+        (before[1], after[0], after[2])
+        for before, after in pairwise(spans)
+        if after[0] - before[1] > _SAME_PLACE and before[2] == after[2]
+    ]
 
 
 def _millimetres(value: float) -> str:

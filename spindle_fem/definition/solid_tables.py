@@ -217,7 +217,9 @@ class BearingSet(SpecModel):
     """Force through the set, which sets of ball bearings must give; bearings in tandem share it. `light`,
     `medium` or `heavy` of bearings that ship. Rollers have `radial_clearance` instead."""
     preload_kind: Literal["rigid", "spring"] = "rigid"
-    """Held by a distance (rings, locknut) or by a force (springs)."""
+    """Held by a distance (rings, locknut) or by a force (springs). Springs may load a set whose bearings all
+    face one way, as two at the rear in tandem: each carries its share whatever the thrust, and the set
+    that carries the thrust holds against them."""
     fit: Fit | None = None
     """Fits of its rings; rigid rings if not given."""
     assembly_temperature: Temperature = 293.15
@@ -242,17 +244,28 @@ class BearingSet(SpecModel):
         """Key of a bearing's type: its own, or that of the set."""
         return self.bearing_type if bearing.bearing_type is None else bearing.bearing_type
 
+    @property
+    def faces_one_way(self) -> bool:
+        """Whether all of its bearings take thrust in one direction."""
+        directions = {bearing.takes_thrust for bearing in self.bearing}
+        return len(directions) == 1 and None not in directions
+
+    @property
+    def spring_force(self) -> float:
+        """Force of its springs on the shaft, N, positive towards the rear; 0 of springs within the set."""
+        if self.preload_kind != "spring" or not self.faces_one_way:
+            return 0.0
+        return self.preload if self.bearing[0].takes_thrust == "towards_nose" else -self.preload
+
     @model_validator(mode="after")
     def _check(self) -> BearingSet:
-        directions = {bearing.takes_thrust for bearing in self.bearing}
-        one_way = len(directions) == 1 and None not in directions
-        if self.preload_kind == "rigid" and self.preload > 0.0 and one_way:
+        if self.preload_kind == "rigid" and self.preload > 0.0 and self.faces_one_way:
             raise_faults(
                 [
                     Fault(
                         "preload",
                         f"{self.preload:g} N is rigid, but every bearing of the set takes_thrust "
-                        f'"{directions.pop()}".',
+                        f'"{self.bearing[0].takes_thrust}".',
                         'Allowed: bearings of both directions, preload_kind = "spring", or no preload.',
                     )
                 ]

@@ -50,7 +50,8 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet |
             )
             for bearing in group.bearing
         ),
-        preload=group.preload,
+        # Springs on bearings that all face one way are a load on them.
+        preload=0.0 if group.spring_force else group.preload,
         preload_kind=group.preload_kind,
         shaft_expansion=_seat_expansion(spec, group, "inner"),
         housing_expansion=_seat_expansion(spec, group, "outer"),

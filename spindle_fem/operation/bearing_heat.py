@@ -248,6 +248,8 @@ class BearingMechanics:
                     control=_control(options or self.options),
                     heat=self.lubricants[group.name].options(options or self.options),
                 )
+                if group.spring_force:
+                    states = tuple(replace(state, preload=state.axial_force) for state in states)
             found |= {state.name: state for state in states}
         return found
 
@@ -323,9 +325,7 @@ class BearingMechanics:
 
     def _load(self, group: BearingSet, point: OperatingPoint) -> mounting.ExternalLoad:
         """External load of a set."""
-        return mounting.ExternalLoad(
-            point.thrust if group.carries_thrust else 0.0, self.radial_loads[group.name]
-        )
+        return mounting.ExternalLoad(self.spec.axial_load(group, point.thrust), self.radial_loads[group.name])
 
     def _roller_states(
         self,

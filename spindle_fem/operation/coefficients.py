@@ -67,7 +67,8 @@ def film_coefficient(
         answer = stream_answer(film, point.speed)
         return np.full(wall.shape, film.factor.value * answer.coefficient), stream_warnings(film, answer)
     rotating = rotating_film(film.correlation, point.speed, film.diameter, minimum=film.minimum)
-    return np.full(wall.shape, film.factor.value * rotating.value), rotating.warnings
+    warnings = tuple(CodedWarning(said.code, f"{film.surface[0]}: {said.text}") for said in rotating.warnings)
+    return np.full(wall.shape, film.factor.value * rotating.value), warnings
 
 
 def _natural_coefficient(film: NaturalFilm, wall: Array, fluid: ArrayLike) -> Array:
@@ -114,7 +115,7 @@ def gap_coefficient(
     found = GAP_LAWS[gap.kind](given)
     warnings: tuple[CodedWarning, ...] = ()
     if found.faults:
-        warnings = (CodedWarning("gap_film_extrapolated", f"Gap {gap.name}: {'; '.join(found.faults)}."),)
+        warnings = (CodedWarning("gap_film_extrapolated", f"{gap.name}: {'; '.join(found.faults)}."),)
     return gap.factor.value * found.value, warnings
 
 

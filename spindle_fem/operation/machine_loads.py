@@ -133,6 +133,13 @@ class LoadsBuilder:
         return tuple(f"{bearing}.balls[{sector}]" for sector in range(self.n_sectors))
 
     @property
+    def _air_names(self) -> set[str]:
+        """What warnings of air films and gaps begin with."""
+        return {name for film in self.spec.film for name in film.surface} | {
+            gap.name for gap in self.spec.gap
+        }
+
+    @property
     def lumped_names(self) -> tuple[str, ...]:
         """Names of the lumped nodes, ball rows and gap air, in the order of every :class:`Loads`."""
         balls = [node for _, bearing in self.spec.bearings for node in self.ball_nodes(bearing.name)]
@@ -188,7 +195,7 @@ class LoadsBuilder:
             tuple(lumped),
             heats,
             heat_to,
-            fold_warnings(warnings, tuple(heats)),
+            fold_warnings(warnings, {*heats, *self._air_names}),
             change,
             {source.name: float(source_heat(source, point.inputs)) for source in self.spec.source},
         )

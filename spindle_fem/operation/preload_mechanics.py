@@ -72,10 +72,10 @@ class PreloadMechanics:
     places: frozenset[str]
 
     def __call__(self, component: str) -> PreloadResponse | None:
-        """Response of one bearing set; None without fits, preload, grease or parts that carry the rings."""
+        """Response of one bearing set; None where its preload cannot change or is not known how."""
         sets = {f"{group.name}_bearings": group for group in self.spec.bearing_set}
         group = sets.get(component)
-        if group is None or group.fit is None or not group.preload > 0.0:
+        if group is None or group.fit is None or not group.preload > 0.0 or group.spring_force:
             return None
         if self.spec.lubricant_of(group) is None or not carries_rings(self.spec):
             return None
@@ -129,7 +129,7 @@ def _solved(spec: MachineSpec, group: BearingSet, places: Collection[str]) -> Pr
         group,
         turning,
         mounting.ExternalLoad(
-            spec.operation.thrust if group.carries_thrust else 0.0, mechanics.radial_loads[group.name]
+            spec.axial_load(group, spec.operation.thrust), mechanics.radial_loads[group.name]
         ),
     )
     table = spec.heat.table

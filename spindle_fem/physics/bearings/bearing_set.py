@@ -168,12 +168,19 @@ def solve_states(
     number = len(bearing_set.bearings)
     columns = np.repeat(width * np.arange(len(problems)), number)
     states = build_states(
-        SolvedBearings(bearings, rows, system, solved, speed, control, columns),
+        SolvedBearings(bearings, rows, system, solved, speed, control, columns, _is_held(bearing_set, loads)),
         Lubrication(lubricant, film, films, (bearing_set.raceway_roughness, bearing_set.ball_roughness)),
         options,
         heat,
     )
     return tuple(states[first : first + number] for first in range(0, len(states), number))
+
+
+def _is_held(bearing_set: BearingSet, loads: Sequence[ExternalLoad]) -> bool:
+    """Whether a distance holds the set, and no force along the axis."""
+    if bearing_set.has_counter_bearings:
+        return bearing_set.preload_kind == "rigid" or bearing_set.preload == 0.0
+    return all(load.thrust == 0.0 for load in loads)
 
 
 def gross_sliding_onset(

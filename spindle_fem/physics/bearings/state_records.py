@@ -99,6 +99,8 @@ class SolvedBearings:
     control : {"outer", "inner", "equilibrium"}
     shaft_columns : (n_bearings,) ndarray
         Where the displacements of each bearing's shaft begin.
+    held : bool
+        By a distance, so that balls can lose their load; springs and thrust keep it.
     """
 
     bearings: Sequence
@@ -108,6 +110,7 @@ class SolvedBearings:
     speed: float
     control: str
     shaft_columns: NDArray[np.int64]
+    held: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,7 +171,7 @@ def build_states(
         bearing_heat_record: BearingHeat | None = None
         temperature = float(lubrication.temperatures[index])
         cage = int(np.sum(weight[solved.carried[part]]))
-        grooves = (distance[0][part], distance[1][part])
+        grooves = (distance[0][part], distance[1][part]) if solved_bearings.held else None
         warnings = _load_warnings(bearing.name, balls, contacts, grooves, control, speed, _cut(system, part))
         if cage:
             text = f"{bearing.name}: friction is too weak to drive {cage} balls; the cage carries them."
@@ -296,16 +299,19 @@ def _load_warnings(
     name: str,
     balls: BallStates,
     contacts: Contacts,
-    grooves: tuple[FloatArray, FloatArray],
+    grooves: tuple[FloatArray, FloatArray] | None,
     control: str,
     speed: float,
     system: BallSystem,
 ) -> list[CodedWarning]:
+    """What a bearing's loads call for; ``grooves`` are None where a force and not a distance holds them."""
     warnings = []
     free = ~(contacts.load[:, INNER] > 0.0)
     # the grooves are too far apart to hold a ball at rest; centrifugal force may still wedge it
-    apart = np.hypot(*grooves) <= system.rest_length.sum(axis=1) * (1.0 + 1e-12)
-    if free.all() or apart.all():
+    apart = grooves is not None and bool(
+        np.all(np.hypot(*grooves) <= system.rest_length.sum(axis=1) * (1.0 + 1e-12))
+    )
+    if free.all() or apart:
         held = "no ball touches the inner raceway" if free.all() else "only centrifugal force seats its balls"
         warnings.append(CodedWarning("counter_bearing_unloaded", f"{name}: {held}; it carries no preload."))
     elif free.any():

@@ -1,0 +1,106 @@
+"""Sets on springs: a rear pair in tandem that all face one way, bearings at both ends in one set."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from spindle_fem.commands.machine_commands import check_machine
+from spindle_fem.definition.load import find_machine, load_machine
+from spindle_fem.definition.solid_tables import Fit
+from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.machine.view.machine_names import MachineNames
+from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.preload_mechanics import PreloadMechanics
+
+TANDEM = ("bearing_set.rear.preload_kind=spring", "bearing_set.rear.bearing.R1.takes_thrust=towards_nose")
+
+
+def states(spec):
+    warm = {b.name: BearingTemperatures(*(313.15,) * 5) for _, b in spec.bearings}
+    return BearingMechanics(spec).states(OperatingPoint.of(spec), warm, expand=False)
+
+
+@pytest.mark.parametrize("thrust", [0.0, 250.0])
+def test_springs_keep_their_force_and_load_the_set_that_holds_the_shaft(thrust):
+    spec = load_machine(
+        "motor_spindle", [*TANDEM, f"operation.thrust={thrust} N", "operation.speed=3000 rpm"]
+    )
+    front, rear = spec.bearing_set
+    assert spec.axial_load(rear, thrust) == -200.0
+    assert spec.axial_load(front, thrust) == thrust + 200.0
+    found = states(spec)
+    for name in ("R1", "R2"):
+        assert found[name].axial_force == pytest.approx(100.0, rel=1e-6)
+        assert found[name].preload == found[name].axial_force
+    # forces along the shaft add up
+    held = found["F1"].axial_force - found["F2"].axial_force
+    assert held == pytest.approx(thrust + 200.0, rel=1e-6)
+
+
+def test_springs_that_push_the_other_way_take_thrust_off():
+    other = "bearing_set.rear.bearing.R2.takes_thrust=towards_rear"
+    spec = load_machine("motor_spindle", [TANDEM[0], other])
+    assert spec.axial_load(spec.bearing_set[0], 300.0) == 100.0
+
+
+def test_a_class_of_springs_loads_each_bearing_as_in_a_pair():
+    spec, pair = (
+        load_machine("motor_spindle", [*changes, "bearing_set.rear.preload=light"])
+        for changes in (TANDEM, TANDEM[:1])
+    )
+    assert spec.bearing_set[1].preload == pytest.approx(2.0 * pair.bearing_set[1].preload, rel=1e-3)
+
+
+def test_springs_on_bearings_of_one_direction_hold_no_shaft():
+    with pytest.raises((FaultsError, SpecError), match=r"rear\.carries_thrust: .*springs, which give way"):
+        load_machine(
+            "motor_spindle",
+            [*TANDEM, "bearing_set.rear.carries_thrust=true", "bearing_set.front.carries_thrust=false"],
+        )
+
+
+def test_their_preload_is_no_effect_of_temperature():
+    spec = load_machine("motor_spindle", TANDEM)
+    fit = Fit(inner_interference="3 um", outer_clearance="6 um")
+    sets = tuple(group.model_copy(update={"fit": fit}) for group in spec.bearing_set)
+    spec = spec.model_copy(update={"bearing_set": sets})
+    mechanics = PreloadMechanics(spec, frozenset(MachineNames.of(spec).place_names))
+    assert mechanics("rear_bearings") is None
+
+
+def test_bearings_at_both_ends_are_one_set_with_rings_of_their_own(tmp_path):
+    # what rules give follows each bearing's own type: seats, raceways, and no spacer between unlike rings
+    text = find_machine("motor_spindle").read_text(encoding="utf-8")
+    sets = text[text.index("bearing_set = [") : text.index("probe = [")]
+    both = """bearing_set = [
+    {name = "both", bearing_type = "7014 C", preload = "300 N", preload_kind = "spring", carries_thrust = true, marks = "A", spacers = "steel", bearing = [
+        {name = "F1", z = "40 mm", takes_thrust = "towards_rear"},
+        {name = "F2", z = "100 mm", takes_thrust = "towards_rear"},
+        {name = "R1", z = "330 mm", takes_thrust = "towards_nose", bearing_type = "7012 C"},
+        {name = "R2", z = "368 mm", takes_thrust = "towards_nose", bearing_type = "7012 C"}]},
+]
+"""  # noqa: E501
+    file = tmp_path / "both.toml"
+    spacers = text[text.index('    {name = "inner_spacer"') : text.index('    {name = "stator", material')]
+    file.write_text(text.replace(sets, both).replace(spacers, ""), encoding="utf-8")
+    said = check_machine(file)
+    conductance = {row["name"]: row["detail"] for row in said["contacts"]}
+    assert conductance["R2.inner_ring|shaft"].startswith("workshop_inner_seats")
+    spacers = [part["name"] for part in said["parts"] if "_spacer" in part["name"]]
+    assert "both_inner_spacer_2" in spacers
+    assert not any(name.endswith("_3") for name in spacers)
+    spec = load_machine(file, ["operation.thrust=100 N", "operation.speed=3000 rpm"])
+    found = states(spec)
+    assert found["F1"].axial_force + found["F2"].axial_force == pytest.approx(400.0, rel=1e-6)
+    assert found["R1"].axial_force + found["R2"].axial_force == pytest.approx(300.0, rel=1e-6)
+    assert math.isfinite(found["F1"].heat.total)
+
+
+def test_springs_keep_the_load_of_balls_that_fly_outwards():
+    # at rest the raceways would stand too far apart for the balls; the springs bring them nearer
+    spec = load_machine("motor_spindle", [*TANDEM, "operation.speed=18000 rpm", "operation.thrust=0 N"])
+    codes = {name: {note.code for note in state.warnings} for name, state in states(spec).items()}
+    assert "counter_bearing_unloaded" not in codes["R1"] | codes["R2"]
