@@ -27,7 +27,7 @@ from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import NO_CHANGE, BearingHeat, FilmLoad, LoadChange, Loads, LumpedLoad
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.seat_joints import SeatJoints
-from spindle_fem.operation.source_terms import source_heat
+from spindle_fem.recordings.source_heat import source_heat
 from spindle_fem.validity import CodedWarning, fold_warnings
 
 GAP_BAND_WIDTH = 0.02

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from spindle_fem.definition.load import load_machine
+from spindle_fem.definition.machine_spec import HeatSource
 from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.lumped.network_view import view_of_network
@@ -73,7 +74,8 @@ def _spindle(folder):
     ):
         text += INPUT % (column, hold, drives, unit)
     recording = _written(folder, "spindle", columns, text)
-    spec = load_machine("recorded_spindle")
+    source = HeatSource.model_validate({"name": "motor", "part": "housing", "heat": "80 W"})
+    spec = load_machine("recorded_spindle").model_copy(update={"source": (source,)})
     fast = fast_spindle(lumped_model(spec), spec)
     return fast, recording, view_of(fast.names, recording), drive_of_recording(spec, recording)
 

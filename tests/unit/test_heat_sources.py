@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from spindle_fem.definition.load import load_machine, write_machine
+from spindle_fem.effects.catalogue.source_scale import SourceScaleTerm
 from spindle_fem.errors import BadInputError
 from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
-from spindle_fem.operation.source_terms import source_heat
 from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.recordings.source_heat import source_heat
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
 from spindle_fem.studies.crosscheck.axisymmetric import solve_axisymmetric
@@ -150,3 +151,21 @@ def test_the_full_model_knows_the_inputs_that_sources_follow(tmp_path) -> None:
     assert source_heat(spec.source[0], history.at(0.5).inputs) == 1.0
     with pytest.raises(BadInputError, match="motor_power"):
         OperatingHistory.of(load_machine("small_two_start"), inputs)
+
+
+def test_a_scaled_source_is_one_of_other_heat(tmp_path) -> None:
+    text = '[[source]]\nname = "motor"\npart = "shaft"\nheat = "%s W"\n'
+    spec, more = (machine(tmp_path, text % heat, "recorded_spindle") for heat in ("80", "120"))
+    drive = drive_of(np.arange(0.0, 1200.0, 60.0), np.full(20, 1500.0))
+    term = SourceScaleTerm("scaled", spec.source[0])
+    found = simulate_fast(
+        fast_spindle(lumped_model(spec), spec),
+        drive,
+        293.15,
+        parameters={"scaled.factor": 1.5},
+        terms=(term,),
+    )
+    expected = simulate_fast(fast_spindle(lumped_model(more), more), drive, 293.15)
+    assert found.temperature == pytest.approx(expected.temperature, abs=1e-9)
+    plain = simulate_fast(fast_spindle(lumped_model(spec), spec), drive, 293.15)
+    assert np.abs(found.temperature - plain.temperature).max() > 0.05

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.machine_spec import HeatSource
 from spindle_fem.effects.framework.preload_response import PreloadResponse
 from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.coolant.properties import coolant_by_name
@@ -239,6 +240,8 @@ class MachineView:
         Mean heat of a network's driven sources while they are on.
     surroundings : mapping of component to tuple of str
         Films whose fluid is that of ``ambient``, or of one boundary of a network.
+    sources : tuple of HeatSource
+        Of a machine with geometry, that give heat.
     preload : callable
         Component of a bearing set to how its friction follows rings and fits; to None where a
         definition does not say enough.
@@ -290,6 +293,7 @@ class MachineView:
     source_inputs: Mapping[str, str] = field(default_factory=dict)
     source_heat: Mapping[str, float] = field(default_factory=dict)
     surroundings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    sources: tuple[HeatSource, ...] = ()
     preload: Callable[[str], PreloadResponse | None] = no_mechanics
 
     @property

@@ -35,6 +35,7 @@ from spindle_fem.machine.view.usual_sizes import (
 )
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.source_heat import source_heat
 from spindle_fem.recordings.standard_inputs import standard_inputs
 
 Array = NDArray[np.float64]
@@ -109,8 +110,16 @@ def view_of(names: MachineNames, recording: Recording) -> MachineView:
         oiled=tuple(bearing.name for group, bearing in spec.bearings if group.lubrication is not None),
         ring_share=1.0 - spec.heat.ball_share,
         surroundings=surroundings,
+        sources=tuple(
+            source for source in spec.source if np.any(np.abs(source_heat(source, _given(recording, inputs))))
+        ),
         **_viscosity(spec),
     )
+
+
+def _given(recording: Recording, inputs: Mapping[str, Array]) -> dict[str, Array]:
+    """Every input of a recording, and those of the machine that it does not give."""
+    return {**dict(zip(recording.input_names, recording.inputs.T, strict=True)), **inputs}
 
 
 def _films(

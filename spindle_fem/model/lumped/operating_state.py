@@ -30,10 +30,10 @@ from spindle_fem.operation.friction_map import film_temperature
 from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.operation.source_terms import source_heat
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.properties import Coolant
 from spindle_fem.physics.coolant.regimes import ChannelState, select_film
+from spindle_fem.recordings.source_heat import source_heat
 
 Array = NDArray[np.float64]
 Law = WallFilmLaw | CoolantLaw | CircuitLaw | FrictionLaw | BallContactLaw

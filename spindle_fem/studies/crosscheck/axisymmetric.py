@@ -29,8 +29,8 @@ from spindle_fem.operation.coefficients import (
     gap_coefficient,
     joint_conductances,
 )
-from spindle_fem.operation.source_terms import source_heat
 from spindle_fem.physics.coolant.linear_march import outlet_stretch
+from spindle_fem.recordings.source_heat import source_heat
 from spindle_fem.solvers.machine_network_steady import MachineNetworkState
 
 Array = NDArray[np.float64]

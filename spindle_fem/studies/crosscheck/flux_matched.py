@@ -24,7 +24,7 @@ from spindle_fem.model.lumped.thermal_network import link_matrix
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.coefficients import fluid_temperature
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.operation.source_terms import source_heat
+from spindle_fem.recordings.source_heat import source_heat
 from spindle_fem.solvers.coupled_steady import CoupledState
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.studies.crosscheck.node_comparison import fem_flows

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import HeatSource, MachineSpec, SourceTable
-from spindle_fem.operation.source_terms import SOURCE_PREFIX, table_heat
+from spindle_fem.operation.source_terms import SOURCE_PREFIX
+from spindle_fem.recordings.source_heat import table_heat
 from spindle_fem.studies.export.state_space import CELSIUS, ModelInput, PowerLoad, unit_of_input
 from spindle_fem.units import ZERO_CELSIUS_K
 
