@@ -103,31 +103,19 @@ class _Assembly:
         self.load = np.zeros(self.n)
         self._facet_of = self._find_facets()
 
-    def _find_facets(self) -> dict[tuple[int, int, int, int], int]:
-        """Edge of each element by (cell, side): sides 0 front, 1 outer, 2 rear, 3 inner."""
-        middles = self.mesh.p[:, self.mesh.facets].mean(axis=1)
-        found = {}
-        for local in range(4):
-            facets = self.mesh.t2f[local]
-            z, r = middles[0, facets], middles[1, facets]
-            for cell, facet in enumerate(facets):
-                radial = bool(np.isclose(z[cell], self.cells.z[cell].mean(), atol=1e-12))
-                low = (
-                    (r[cell] < self.cells.r[cell].mean()) if radial else (z[cell] < self.cells.z[cell].mean())
-                )
-                found[cell, radial, low] = int(facet)
+    def _find_facets(self) -> NDArray[np.int64]:
+        """Edge of each element by whether it is radial and on the low side, (n_cells, 2, 2)."""
+        edges, cells = self.mesh.t2f, self.cells
+        z, r = self.mesh.p[:, self.mesh.facets].mean(axis=1)[:, edges]
+        radial = np.isclose(z, cells.z.mean(axis=1), atol=1e-12)
+        low = np.where(radial, r < cells.r.mean(axis=1), z < cells.z.mean(axis=1))
+        found = np.empty((edges.shape[1], 2, 2), dtype=np.int64)
+        found[np.arange(edges.shape[1]), radial.astype(int), low.astype(int)] = edges
         return found
 
     def facets(self, faces: Faces, cell: NDArray[np.int64]) -> NDArray[np.int64]:
         """Mesh edges of faces as seen from one side's cells."""
-        is_second = cell == faces.second
-        return np.array(
-            [
-                self._facet_of[int(c), bool(radial), bool(second)]
-                for c, radial, second in zip(cell, faces.radial, is_second, strict=True)
-            ],
-            dtype=np.int64,
-        )
+        return self._facet_of[cell, faces.radial.astype(int), (cell == faces.second).astype(int)]
 
     def edge_basis(self, facets: NDArray[np.int64]) -> FacetBasis:
         return FacetBasis(self.mesh, self.element, facets=facets, intorder=5)
