@@ -10,7 +10,6 @@ from spindle_fem.effects.framework.term import TermContext, TermParameter
 Complex = NDArray[np.complex128]
 
 RPM = np.pi / 30.0
-HOUR = 3600.0
 
 
 def smooth_step(argument: ArrayLike) -> Complex:

@@ -181,13 +181,6 @@ def probe_matrix(operators: ThermalOperators, points: ArrayLike, parts: Sequence
     )
 
 
-def temperature_at_points(
-    operators: ThermalOperators, temperature: NDArray[np.float64], points: ArrayLike, parts: Sequence[str]
-) -> NDArray[np.float64]:
-    """Temperature at points of given parts, (n,) [K]."""
-    return probe_matrix(operators, points, parts) @ temperature
-
-
 def mean_matrix(operators: ThermalOperators, surfaces: Sequence[str]) -> sparse.csr_array:
     """Rows that give area-mean temperatures of surfaces, (n_surfaces, n_unknowns)."""
     rows = []
@@ -202,41 +195,6 @@ def surface_mean(operators: ThermalOperators, temperature: NDArray[np.float64], 
     """Area-mean temperature of a surface, [K]."""
     rows = operators.rows_of(surface, "mean temperature")
     return float(operators.facet_integral(temperature, rows).sum() / operators.facet_area[rows].sum())
-
-
-def facet_means(
-    operators: ThermalOperators, temperature: NDArray[np.float64], surface: str
-) -> NDArray[np.float64]:
-    """Mean temperature of each facet of a surface, (n_facets,) [K]."""
-    rows = operators.rows_of(surface, "facet temperatures")
-    return operators.facet_integral(temperature, rows) / operators.facet_area[rows]
-
-
-def joint_means(
-    operators: ThermalOperators, temperature: NDArray[np.float64], joint: str
-) -> tuple[float, float]:
-    """Mean temperatures of side a and side b of a joint, [K]."""
-    sides = operators.joint_sides(joint, "joint temperatures")
-    means = [
-        float(operators.facet_integral(temperature, rows).sum() / operators.facet_area[rows].sum())
-        for rows in sides
-    ]
-    return means[0], means[1]
-
-
-def part_mean(operators: ThermalOperators, temperature: NDArray[np.float64], part: str) -> float:
-    """Volume-mean temperature of a part, [K]."""
-    own = operators.part_of_unknown == operators.part_index(part, "part mean")
-    return float(operators.part_load[own] @ temperature[own] / operators.part_volume[part])
-
-
-def extreme(
-    operators: ThermalOperators, temperature: NDArray[np.float64], *, hottest: bool = True
-) -> tuple[float, NDArray[np.float64], str]:
-    """Hottest (or coldest) node: temperature [K], place (3,) [m], part."""
-    node = int(np.argmax(temperature) if hottest else np.argmin(temperature))
-    part = operators.mesh.part_names[operators.part_of_unknown[node]]
-    return float(temperature[node]), operators.mesh.points[node], part
 
 
 def temperature_at_nodes(
