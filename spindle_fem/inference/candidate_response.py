@@ -146,7 +146,7 @@ class BaseRun:
                 found[:, : len(self.columns), position] += self._reading(variant)
             if any(term.is_dynamic for term in candidate.terms):
                 dynamic.append(position)
-            if candidate.factors or any(_is_steady(term) for term in candidate.terms):
+            if candidate.factors or any(term.is_steady for term in candidate.terms):
                 steady.append(position)
         for first in range(0, len(dynamic), CHUNK):
             chosen = dynamic[first : first + CHUNK]
@@ -266,7 +266,7 @@ class BaseRun:
             for factor in candidate.factors:
                 step = float(np.log(candidate.reference)) if factor.logarithmic else candidate.reference - 1.0
                 own.append((factor.name, step))
-            steady = [term for term in candidate.terms if _is_steady(term)]
+            steady = [term for term in candidate.terms if term.is_steady]
             if steady:
                 # Each variant's own copy under a name of its own, at rest.
                 for term in steady:
@@ -295,14 +295,6 @@ class BaseRun:
             for name, step in own:
                 found[:, :, position] += step * slopes[:, :, asked.index(name)]
         return found
-
-
-def _is_steady(term: Term) -> bool:
-    own = type(term)
-    return any(
-        getattr(own, name) is not getattr(Term, name)
-        for name in ("operating_factor", "place_capacity", "place_conductance")
-    )
 
 
 def _renamed(term: Term, name: str) -> Term:

@@ -190,6 +190,15 @@ class Term:
         """Whether anything depends on temperatures, time or state."""
         return bool(self.heat_places or self.coefficients or self.bearings)
 
+    @property
+    def is_steady(self) -> bool:
+        """Whether it changes the machine by the operating point alone: its coefficients or its places."""
+        own = type(self)
+        return any(
+            getattr(own, name) is not getattr(Term, name)
+            for name in ("operating_factor", "place_capacity", "place_conductance")
+        )
+
 
 class RecordedHeat(Term):
     """Heat that a recording gives for a place: an input ``heat.<place>`` in W.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.term import FLOW, Term, TermParameter
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.model.reduced.fast_model import ClassOperators, FastModel
+from spindle_fem.operation.effect_terms import multiplied
 from spindle_fem.operation.operating_point import OperatingPoint
 
 Array = NDArray[np.float64]
@@ -84,7 +85,7 @@ def run_operators(
     asked = tuple(name for name in derivatives if name not in owned)
     changes = SteadyChanges(fast, terms)
     parts = [changes.parts(point, parameters) for point in points]
-    scaled = [changes.together(own) for own in parts]
+    scaled = [multiplied(own) for own in parts]
     added = changes.conductances(parameters)
     storage = fast.storage(factors, changes.capacities(parameters))
     storage_by = fast.storage_by(factors, asked)
@@ -94,7 +95,7 @@ def run_operators(
     steady = [
         _SteadyChange.of(changes, parts, points, parameters, name, *owned[name])
         for name in derivatives
-        if name in owned and changes.is_steady(owned[name][0])
+        if name in owned and owned[name][0].is_steady
     ]
     owner = np.arange(len(points))
     if same_within > 0.0:
@@ -201,7 +202,7 @@ class _SteadyChange:
             # To the logarithm: d/d ln x = x d/dx.
             (value if item.logarithmic else 1.0) / (2.0 * step),
             [
-                tuple(changes.together(changes.with_part(own, term, point, end)) for end in (above, below))
+                tuple(multiplied(changes.with_part(own, term, point, end)) for end in (above, below))
                 for own, point in zip(parts, points, strict=True)
             ],
             (changes.capacities(above), changes.capacities(below)),
@@ -236,15 +237,6 @@ class SteadyChanges:
         self.fast, self.terms = fast, tuple(terms)
         self.known = {*fast.table.groups, FLOW}
 
-    @staticmethod
-    def is_steady(term: Term) -> bool:
-        """Whether a term changes anything but heat and factors over time."""
-        own = type(term)
-        return any(
-            getattr(own, name) is not getattr(Term, name)
-            for name in ("operating_factor", "place_capacity", "place_conductance")
-        )
-
     def parts(self, point: OperatingPoint, values: Mapping[str, float]) -> list[dict[str, float]]:
         """Factors that each term puts on coefficients at an operating point."""
         return [self._part(term, point, values) for term in self.terms]
@@ -261,15 +253,6 @@ class SteadyChanges:
             self._part(own, point, values) if own is term else part
             for own, part in zip(self.terms, parts, strict=True)
         ]
-
-    @staticmethod
-    def together(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
-        """Factors of all terms by coefficient."""
-        found: dict[str, float] = {}
-        for part in parts:
-            for name, factor in part.items():
-                found[name] = found.get(name, 1.0) * factor
-        return found
 
     def _part(self, term: Term, point: OperatingPoint, values: Mapping[str, float]) -> dict[str, float]:
         found = term.operating_factor(point, term.values(values))
