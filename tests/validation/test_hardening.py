@@ -15,6 +15,7 @@ from validation.hardening.page import page, summarise
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.slow
 def test_a_sample_of_spoilt_inputs_is_accepted_or_refused(tmp_path):
     command = [sys.executable, "-m", "validation.hardening", "-o", str(tmp_path), "--short", "--jobs", "1"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
