@@ -59,7 +59,7 @@ NETWORK = network_text(
 
 def _spindle(folder):
     """Fast model, recording, view and drive of a lumped reference spindle."""
-    time = np.arange(0.0, 7200.0, 30.0)
+    time = np.arange(0.0, 7200.0, 60.0)
     speed = np.select([time < 300, time < 2700, time < 3600, time < 5400], [0.0, 3000.0, 0.0, 1500.0], 4000.0)
     columns = {"t": time, "speed": speed, "ambient": 20.0 + 0.5 * np.sin(time / 900.0)}
     columns["coolant_in"] = np.where(time < 4000.0, 15.0, 30.0)

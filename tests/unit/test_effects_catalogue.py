@@ -168,7 +168,7 @@ def test_without_amplitude_nothing_happens(machines, kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_complex_steps_are_differences(machines, kind):
     _, _, view, drive = machines[kind]
-    rows = np.array([15, 60, 130])
+    rows = np.array([10, 40, 90])
     for candidate in everything(view):
         values = amplitude_at(candidate, candidate.reference)
         for term in candidate.terms:
@@ -332,7 +332,7 @@ def test_heat_while_on_is_the_mean_over_the_intervals(machines):
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_entry_of_a_definition_builds_the_same_effect_again(machines, kind):
     _, _, view, drive = machines[kind]
-    rows = np.array([15, 60, 130])
+    rows = np.array([10, 40, 90])
     for candidate in everything(view):
         values = amplitude_at(candidate, candidate.reference)
         entry = definition_entry(candidate, values)

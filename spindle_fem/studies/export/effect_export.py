@@ -19,6 +19,7 @@ from spindle_fem.model.reduced.class_operators import NO_CHANGES
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.run_operators import SteadyChanges
+from spindle_fem.operation.effect_terms import multiplied
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
 from spindle_fem.studies.export.source_export import SourceTableLoad
@@ -102,7 +103,7 @@ class ExportedEffects:
 
     def changes(self, point: OperatingPoint, beside: Mapping[str, float] = NO_CHANGES) -> dict[str, float]:
         """Factors on coefficients at an operating point, with others beside."""
-        return self._changes.together((*self._changes.parts(point, {}), beside))
+        return multiplied((*self._changes.parts(point, {}), beside))
 
     def read(self, outputs: Sequence[str], loads: Sequence[str], output: Array, direct: Array) -> None:
         """Apply the sensors' lines to the output matrices, in place.
