@@ -33,7 +33,7 @@ from spindle_fem.inference.prepared_problem import (
 )
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
-from spindle_fem.inference.state_search import Told, told_states
+from spindle_fem.inference.state_search import InferredState, inferred_states
 from spindle_fem.inference.verdict import Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
@@ -89,12 +89,12 @@ class Diagnosis:
     followed: Followed | None = None
 
     @property
-    def told(self) -> Fit:
-        """The chosen set as it is told: with hidden states from all readings, else as it was fitted."""
+    def stated_fit(self) -> Fit:
+        """The chosen set as it is stated: with hidden states from all readings, else as it was fitted."""
         return self.followed.fit if self.followed and self.followed.states else self.final
 
     @property
-    def states(self) -> Mapping[str, Told]:
+    def states(self) -> Mapping[str, InferredState]:
         """Hidden states of the chosen set, by the name of their amplitude."""
         return self.followed.states if self.followed else {}
 
@@ -198,7 +198,7 @@ def diagnose_recordings(
         predictor, final = unchanged, plain
         refitted = _refit(final, found, workers, overlapping, FollowedReadings(final, final), coarseness)
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
-    readings = FollowedReadings(final, plain, lambda fit: told_states(search, final, fit))
+    readings = FollowedReadings(final, plain, lambda fit: inferred_states(search, final, fit))
     refitted = with_own_noise(plain, readings.residuals, readings.kept(refitted))
     refitted = [replace(h, heldout=readings.heldout_misfit(h.fit)) for h in refitted]
     clock.lap("final fits")

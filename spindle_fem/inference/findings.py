@@ -78,7 +78,7 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
     state = None
     if fit is diagnosis.final:
         state = diagnosis.states.get(candidate.amplitude)
-        fit, place = diagnosis.told, fit.candidates.index(candidate)
+        fit, place = diagnosis.stated_fit, fit.candidates.index(candidate)
         candidate = fit.candidates[place]
     parameters = reported_parameters(fit, candidate)
     reported = {name: Reported(item["value"], item["unit"]) for name, item in parameters.items()}
@@ -171,10 +171,10 @@ def at_stamps(predictor: Predictor, number: int, on_grid: Array) -> Array:
     """
     recording, grid = predictor.recordings[number], predictor.drives[number].grid
     kelvins = recording.temperature_count
-    told = np.array([np.interp(recording.times, grid, column) for column in on_grid.T]).T
-    apart = np.where(recording.usable, recording.temperature - told, np.nan)[:, kelvins:]
-    told[:, kelvins:] += [np.nanmean(own) if np.isfinite(own).any() else 0.0 for own in apart.T]
-    return told
+    predicted = np.array([np.interp(recording.times, grid, column) for column in on_grid.T]).T
+    apart = np.where(recording.usable, recording.temperature - predicted, np.nan)[:, kelvins:]
+    predicted[:, kelvins:] += [np.nanmean(own) if np.isfinite(own).any() else 0.0 for own in apart.T]
+    return predicted
 
 
 def rmse(predictor: Predictor, predicted: Sequence[Array], *, heldout: bool) -> float:

@@ -16,7 +16,7 @@ from spindle_fem.inference.input_sampling import error_over_noise, left_over_noi
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.reading_noise import ChannelBins, Whitener
 from spindle_fem.inference.robust_size import huber
-from spindle_fem.inference.state_search import Told
+from spindle_fem.inference.state_search import InferredState
 from spindle_fem.inference.unseen_moments import unread_changes, unseen_moments
 
 Array = NDArray[np.float64]
@@ -31,12 +31,12 @@ class Followed:
 
     Attributes
     ----------
-    states : mapping of str to Told
+    states : mapping of str to InferredState
         Hidden states, by the name of their amplitude.
     """
 
     fit: Fit
-    states: Mapping[str, Told] = field(default_factory=dict)
+    states: Mapping[str, InferredState] = field(default_factory=dict)
 
 
 class FollowedReadings:
@@ -47,14 +47,14 @@ class FollowedReadings:
     final, plain : Problem
         With effects, and with nothing missing.
     follow : callable
-        Hidden states of a fit from all readings, as :func:`told_states` gives them.
+        Hidden states of a fit from all readings, as :func:`inferred_states` gives them.
     """
 
     def __init__(
         self,
         final: Problem,
         plain: Problem,
-        follow: Callable[[Fit], Mapping[str, Told]] = lambda fit: {},
+        follow: Callable[[Fit], Mapping[str, InferredState]] = lambda fit: {},
     ) -> None:
         self._plant, self._unchanged, self._final = final.predictor, plain.predictor, final
         self._slow = final.slow

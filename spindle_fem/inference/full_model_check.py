@@ -377,10 +377,10 @@ def _readings(predictor: Predictor, number: int, fit: Fit, run: MachineTransient
     count = recording.temperature_count
     temperatures = [run.reading(probe) for probe in recording.probes[:count]]
     displacements = [MICROMETRES * run.motion_of(sensor) for sensor in recording.probes[count:]]
-    told = np.column_stack([*temperatures, *displacements])
-    told = predictor.read(number, predictor.effects.candidates, {}, told)
-    told = told + _first_order(predictor, number, fit)
-    return predictor.read(number, _acting(fit.candidates, number), fit.values, told)
+    predicted = np.column_stack([*temperatures, *displacements])
+    predicted = predictor.read(number, predictor.effects.candidates, {}, predicted)
+    predicted = predicted + _first_order(predictor, number, fit)
+    return predictor.read(number, _acting(fit.candidates, number), fit.values, predicted)
 
 
 def _first_order(predictor: Predictor, number: int, fit: Fit) -> Array | float:

@@ -28,14 +28,14 @@ from spindle_fem.units import Uncertain
 def _without_directions(diagnosis: Diagnosis) -> Fit:
     """The chosen set on the machine as its definition can be written."""
     if not diagnosis.predictor.misdescribed:
-        return diagnosis.told
-    predictor, belief = diagnosis.predictor.misdescribed_by((), {}), diagnosis.told.known
+        return diagnosis.stated_fit
+    predictor, belief = diagnosis.predictor.misdescribed_by((), {}), diagnosis.stated_fit.known
     of_directions = (MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)
     kept = [i for i, item in enumerate(belief.coordinates) if not item.name.startswith(of_directions)]
     covariance = np.linalg.inv(belief.root.T @ belief.root)[np.ix_(kept, kept)]
     root = np.linalg.cholesky(np.linalg.inv(covariance)).T
     known = Belief(tuple(belief.coordinates[i] for i in kept), belief.mean[kept], root)
-    slow, fit = diagnosis.calibrated.slow, diagnosis.told
+    slow, fit = diagnosis.calibrated.slow, diagnosis.stated_fit
     # The part explained by directions is slow error now: the second fit knows its size.
     for _ in range(2):
         problem = Problem(predictor, known, slow, predictor.observations)
@@ -52,7 +52,7 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     in its hole is left as defined. No key corresponds to those of
     a network: its parameters are fitted once more, without them.
     """
-    fit = _without_directions(diagnosis) if machine.is_network else diagnosis.told
+    fit = _without_directions(diagnosis) if machine.is_network else diagnosis.stated_fit
     values = fit.values
     entries = tuple(
         EffectEntry.model_validate(definition_entry(item, candidate_values(item, values)))

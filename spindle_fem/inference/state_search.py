@@ -80,7 +80,7 @@ def add_states(search: Search, fit: Fit, number: int = tuned.STATE_PLACES) -> No
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class InferredState:
     """A hidden state inferred from all readings, including those held out from fits.
 
     Attributes
@@ -115,7 +115,7 @@ class Told:
         return f" It is on {often} while {self.gate} is zero{always}."
 
 
-def told_states(search: Search, problem: Problem, fit: Fit) -> dict[str, Told]:
+def inferred_states(search: Search, problem: Problem, fit: Fit) -> dict[str, InferredState]:
     """Every hidden state of a fit inferred from all readings, by the name of its amplitude."""
     found = {}
     for candidate in fit.candidates:
@@ -130,7 +130,7 @@ def told_states(search: Search, problem: Problem, fit: Fit) -> dict[str, Told]:
         middle = 0.5 * (drive.grid[1:] + drive.grid[:-1])
         within = [(middle > start) & (middle < end) for start, end in intervals]
         probability = tuple(float(again.probability[rows].mean()) for rows in within)
-        told = Told(_candidate(search, place, intervals, again), probability)
+        state = InferredState(_candidate(search, place, intervals, again), probability)
         length = np.diff(drive.grid)
         on = np.where(again.on, length, 0.0)
         conditions = conditions_of_inputs(BaseRun(problem.predictor, place.recording, *_bare(fit, candidate)))
@@ -140,8 +140,8 @@ def told_states(search: Search, problem: Problem, fit: Fit) -> dict[str, Told]:
         best = max(inside, key=lambda name: inside[name] - usual[name], default="")
         if best and inside[best] > MOSTLY_INSIDE and inside[best] - usual[best] > TELLS:
             filled = float(on[conditions[best] == 1].sum() / length[conditions[best] == 1].sum())
-            told = replace(told, gate=best, inside=inside[best], filled=filled)
-        found[candidate.amplitude] = told
+            state = replace(state, gate=best, inside=inside[best], filled=filled)
+        found[candidate.amplitude] = state
     return found
 
 

@@ -83,7 +83,7 @@ def found(request, opened, tmp_path_factory):
     problem = Problem(predictor, calibrated.belief, expected_slow_error(predictor), predictor.observations)
     fit = problem.fit((candidate,), own)
     outcome = SimpleNamespace(
-        told=fit,
+        stated_fit=fit,
         final=fit,
         predictor=predictor,
         machine_coordinates=calibrated.belief.coordinates,
