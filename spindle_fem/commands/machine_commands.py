@@ -60,12 +60,13 @@ def run_machine(
     started = time.perf_counter()
     spec = load_buildable(machine, overrides)
     with output_folder(folder) as place, stages(progress) as tell, OutputHelpers() as helpers:
-        # loaded after the helpers start, which load their own at the same time
+        # loaded after the first helper starts, which loads its own at the same time
         from spindle_fem.results.run_summary import SUMMARY_SCHEMA
         from spindle_fem.solvers.prepared_machine import prepare_machine
         from spindle_fem.studies.run_checks import require_checks
         from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared
 
+        helpers.start_charts()
         prepared = prepare_machine(spec, progress=tell)
         helpers.prepare(spec, prepared.mesh, prepared.operators.n_unknowns)
         result = solve_prepared(

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
     from spindle_fem.model.elastic.deformed_shape import BodyShape
     from spindle_fem.operation.bearing_heat import BearingTemperatures
+    from spindle_fem.physics.bearings.seat_contact import SeatBodies
     from spindle_fem.report.block_page import Illustration
     from spindle_fem.report.drawn_surfaces import SegmentSet
     from spindle_fem.results.thermal_result import ThermalResult
@@ -41,14 +42,14 @@ class OutputHelpers:
     """The processes that write a run's files beside this one; use as a context manager.
 
     Start them before the machine is meshed and solved: what they load then
-    costs no time.
+    costs no time. The first is started at once, the others by :meth:`start_charts`.
     """
 
     def __init__(self) -> None:
         # A copy of a process that has drawn would share the threads of its renderer without having them.
         self._pictures = BackgroundProcess(_PictureWorker, beside=_no_renderer())
-        self._charts = BackgroundProcess(_ChartWorker)
-        self._over_speed = BackgroundProcess(_OverSpeedWorker)
+        self._charts: BackgroundProcess | None = None
+        self._over_speed: BackgroundProcess | None = None
         self._waiting: dict[str, Callable[[], Any]] = {}
         self._begun: Path | None = None
 
@@ -56,12 +57,21 @@ class OutputHelpers:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._pictures.close()
-        self._charts.close()
-        self._over_speed.close()
+        for process in (self._pictures, self._charts, self._over_speed):
+            if process is not None:
+                process.close()
+
+    def start_charts(self) -> None:
+        """Start what draws charts and writes data, as copies of this process.
+
+        What this process has loaded until then, the solver above all, they need not load again.
+        """
+        self._charts = self._charts or BackgroundProcess(_ChartWorker)
+        self._over_speed = self._over_speed or BackgroundProcess(_OverSpeedWorker)
 
     def prepare(self, spec: MachineSpec, mesh: TaggedMesh, n_unknowns: int) -> None:
         """Start the work that needs only mesh and definition."""
+        self.start_charts()
         self._pictures.ask("prepare", mesh, n_unknowns)
         self._charts.ask("draw_definition", spec)
 
@@ -71,6 +81,7 @@ class OutputHelpers:
         figures.mkdir(exist_ok=True)
         for old in figures.glob("*.png"):
             old.unlink()
+        self.start_charts()
         # what growth is worked out with is large, and not for other processes
         plain = replace(result, growth_model=None)
         self._begun = folder
@@ -78,8 +89,10 @@ class OutputHelpers:
         self._waiting["data"] = self._charts.ask("write_data", plain, folder)
         self._waiting["charts"] = self._charts.ask("write_charts")
         if result.spec.heat.model != "table" and result.bearing_temperatures:
-            temperatures = dict(result.bearing_temperatures)
-            self._waiting["over speed"] = self._over_speed.ask("write", result.spec, temperatures, figures)
+            growth = result.growth_model
+            seats = None if growth is None else growth.seating.of_sets(result.spec)
+            known = dict(result.bearing_temperatures), seats
+            self._waiting["over speed"] = self._over_speed.ask("write", result.spec, *known, figures)
 
     def begun_in(self, folder: Path) -> bool:
         """Whether a result's files are being written to this folder."""
@@ -223,13 +236,17 @@ class _OverSpeedWorker:
         self._drawn: dict[str, Illustration] = {}
 
     def write(
-        self, spec: MachineSpec, temperatures: Mapping[str, BearingTemperatures], figures: Path
+        self,
+        spec: MachineSpec,
+        temperatures: Mapping[str, BearingTemperatures],
+        seats: Mapping[str, SeatBodies] | None,
+        figures: Path,
     ) -> float:
         """Write the charts, none where no speed examined has an equilibrium; return the seconds."""
         from spindle_fem.report.figure_style import image_of
 
         began = time.perf_counter()
-        study = self._heat_study(spec, temperatures=temperatures)
+        study = self._heat_study(spec, temperatures=temperatures, seats=seats)
         for name, draw in self._charts.items() if study["models"] else ():
             figure = draw(study)
             if figure is not None:

@@ -18,6 +18,7 @@ from spindle_fem.physics.bearings.bearing_state import BearingState
 from spindle_fem.physics.bearings.heat_model import friction_model_names
 from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.bearings.roller_set import RollerSet
+from spindle_fem.physics.bearings.seat_contact import SeatBodies
 from spindle_fem.units import ZERO_CELSIUS_K
 from spindle_fem.validity import CodedWarning, fold_warnings
 
@@ -34,6 +35,7 @@ def heat_study(
     *,
     coupled: bool = False,
     temperatures: Mapping[str, BearingTemperatures] | None = None,
+    seats: Mapping[str, SeatBodies] | None = None,
 ) -> dict[str, Any]:
     """Speed sweep of every bearing, beside every heat model, and a thrust sweep.
 
@@ -49,6 +51,8 @@ def heat_study(
     temperatures : mapping of bearing to BearingTemperatures, optional
         Of a solved machine, kept for every speed; the isothermal films keep
         ``temperature``.
+    seats : mapping of bearing set to SeatBodies, optional
+        Elastic bodies under its rings where they are known; solved for here otherwise.
 
     Bearings grow with temperatures that were solved for, where the machine follows its preload; at one for
     all they keep the size of assembly.
@@ -72,7 +76,8 @@ def heat_study(
     chosen = tuple(speeds) or usual_speeds(spec)
     point = OperatingPoint.of(spec)
     expand = spec.follows_preload and (coupled or temperatures is not None)
-    seats = RingSeats(spec, machine_bodies(spec)).of_sets(spec) if expand and grows(spec) else None
+    if seats is None and expand and grows(spec):
+        seats = RingSeats(spec, machine_bodies(spec)).of_sets(spec)
     mechanics = BearingMechanics(spec, seats)
     factors = {bearing.name: group.heat_factor.value for group, bearing in spec.bearings}
     names = [bearing.name for _, bearing in spec.bearings]
