@@ -5,7 +5,10 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
+import itertools
+import textwrap
 from collections.abc import Iterator
 from typing import Any
 
@@ -243,15 +246,29 @@ def _fields(model: type[BaseModel]) -> list[tuple[str, FieldInfo]]:
     return [(field.alias or name, field) for name, field in model.model_fields.items() if name != "marks"]
 
 
+def meanings(model: type[BaseModel]) -> dict[str, str]:
+    """The text under each key of a table, its own and those that it inherits."""
+    found: dict[str, str] = {}
+    for kind in reversed(model.__mro__):
+        if not issubclass(kind, BaseModel) or kind is BaseModel:
+            continue
+        (written,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+        for key, text in itertools.pairwise(written.body):
+            if isinstance(key, ast.AnnAssign) and isinstance(text, ast.Expr):
+                found[key.target.id] = inspect.cleandoc(ast.literal_eval(text.value))
+    return {field.alias or name: found.get(name, "") for name, field in model.model_fields.items()}
+
+
 def _prose(model: type[BaseModel]) -> str:
     return inspect.cleandoc(model.__doc__ or "").replace("``", "`")
 
 
 def _key_table(model: type[BaseModel]) -> str:
     lines = ["| key | meaning | allowed | default |", "|---|---|---|---|"]
+    texts = meanings(model)
     for key, field in _fields(model):
         annotation = annotation_of(field)
-        meaning = " ".join((field.description or "").replace("``", "`").split())
+        meaning = " ".join(texts[key].replace("``", "`").split())
         cells = (f"`{key}`", meaning, _allowed(annotation, key), _default(field, annotation))
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"

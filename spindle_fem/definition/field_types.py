@@ -390,7 +390,8 @@ class SpecModel(BaseModel):
         frozen=True,
         arbitrary_types_allowed=True,
         validate_default=False,
-        use_attribute_docstrings=True,
+        # of the tables that a file has not, none is needed
+        defer_build=True,
     )
     marks: dict[str, str] = Field(default_factory=dict)
     """Origin of the values: P, C, A or U, for the table or key by key."""

@@ -38,9 +38,7 @@ _ROTATION_UNITS = ("revolution", "turn", "radian", "degree")
 
 
 class _ManifestModel(BaseModel):
-    model_config: ClassVar[ConfigDict] = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True
-    )
+    model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 Table = TypeVar("Table", bound=_ManifestModel)
