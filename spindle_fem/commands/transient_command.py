@@ -6,6 +6,7 @@ import contextlib
 import csv
 import json
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ import numpy as np
 from spindle_fem.definition.load import load_machine, write_machine
 from spindle_fem.model.mesh.evaluate import temperature_at_nodes
 from spindle_fem.model.mesh.thermal_state import ThermalState
-from spindle_fem.report.transient_report import write_transient_figures, write_transient_report
+from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.parallel import BackgroundProcess
 from spindle_fem.results.field_series import FieldSeries
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.run_log import LOGGER
@@ -22,7 +24,14 @@ from spindle_fem.solvers.mesh_terms import NO_PHYSICS
 from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 from spindle_fem.solvers.saved_state import load_state, save_state
 from spindle_fem.studies.shipped_files import find_study
-from spindle_fem.studies.transient_study import StudyResult, TransientStudy, load_study, run_study
+from spindle_fem.studies.solve_machine import solve_prepared
+from spindle_fem.studies.transient_study import (
+    StudyResult,
+    TransientStudy,
+    last_point,
+    load_study,
+    run_study,
+)
 from spindle_fem.studies.transient_summary import motion_key, summarise
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -76,7 +85,9 @@ def run_transient_study(
             from spindle_fem.model.reduced.defined_effects import physics_of
 
             physics = physics_of(prepared)
-        with _fields(place / FIELDS, prepared, asked) as add_field:
+        make = partial(_Beside, prepared, last_point(spec, asked))
+        with BackgroundProcess(make) as beside, _fields(place / FIELDS, prepared, asked) as add_field:
+            steady = beside.ask("steady_probes")
             result = run_study(
                 prepared,
                 asked,
@@ -86,15 +97,41 @@ def run_transient_study(
                 progress=progress,
                 keep=add_field,
             )
-        keep(prepared, result)
-        summary = summarise(prepared, result)
-        _write_table(result, place / "transient.csv")
-        save_state(place / "state.npz", result.state, result.memory)
-        replace_text(place / "machine.toml", write_machine(prepared.spec))
-        replace_text(place / "transient.json", json.dumps(summary, indent=1) + "\n")
-        write_transient_figures(summary, result, place)
-        write_transient_report(place)
+            keep(prepared, result)
+            summary = summarise(prepared, result, steady)
+            replace_text(place / "transient.json", json.dumps(summary, indent=1) + "\n")
+            pages = beside.ask("write_pages", summary, result, place)
+            _write_table(result, place / "transient.csv")
+            save_state(place / "state.npz", result.state, result.memory)
+            replace_text(place / "machine.toml", write_machine(prepared.spec))
+            pages()
         return summary
+
+
+class _Beside:
+    """What a process beside the steps does of a study: the steady state at its end, pictures and page."""
+
+    def __init__(self, machine: PreparedMachine, point: OperatingPoint) -> None:
+        self._machine, self._point = machine, point
+
+    def steady_probes(self) -> dict[str, float]:
+        """Probes of the steady state that the last phase tends to, K.
+
+        Raises
+        ------
+        NoSteadyStateError
+        """
+        # what draws is loaded while the other process steps
+        from spindle_fem.report import transient_report  # noqa: F401
+
+        return dict(solve_prepared(self._machine, self._point).probes)
+
+    def write_pages(self, summary: dict[str, Any], result: StudyResult, folder: Path) -> None:
+        """Write the pictures and the page."""
+        from spindle_fem.report.transient_report import write_transient_figures, write_transient_report
+
+        write_transient_figures(summary, result, folder)
+        write_transient_report(folder)
 
 
 @contextlib.contextmanager

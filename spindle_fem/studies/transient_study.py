@@ -23,6 +23,7 @@ from spindle_fem.definition.field_types import (
     raise_faults,
 )
 from spindle_fem.definition.load import read_toml
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.machine.geometry.coolant_path import delivered_flow
 from spindle_fem.model.mesh.thermal_state import ThermalState
@@ -291,15 +292,8 @@ def run_study(
     if start is not None:
         require_state(machine, start)
     options = study.options()
-    values = {name: getattr(point, field) for name, field in FIELD_OF.items()}
-    asked = machine.spec.coolant.flow if machine.spec.coolant else None
     state, results = start, []
-    for phase in study.phase:
-        given = {name: getattr(phase, field) for name, field in FIELD_OF.items()}
-        values |= {name: value for name, value in given.items() if value is not None}
-        asked = asked if phase.coolant_flow is None else phase.coolant_flow
-        if asked is not None and machine.spec.has_pump_limit:
-            values["coolant_flow"] = float(delivered_flow(machine.spec, values["coolant_inlet"], asked))
+    for phase, values in zip(study.phase, phase_inputs(machine.spec, study), strict=True):
         beyond = (physics, memory)
         watch = _StudyWatch(progress, keep, study.fields_every)
         result = _run_phase(machine, study, phase, values, state, options, beyond, watch)
@@ -309,6 +303,28 @@ def run_study(
         last = result.transient.state
         state = ThermalState(last.time, last.temperature, last.lumped_temperature)
     return StudyResult(study, tuple(results))
+
+
+def phase_inputs(spec: MachineSpec, study: TransientStudy) -> list[dict[str, float]]:
+    """Inputs of every phase by name: what a phase leaves out stays as before."""
+    point = OperatingPoint.of(spec)
+    values = {name: getattr(point, field) for name, field in FIELD_OF.items()}
+    asked = spec.coolant.flow if spec.coolant else None
+    found = []
+    for phase in study.phase:
+        given = {name: getattr(phase, field) for name, field in FIELD_OF.items()}
+        values |= {name: value for name, value in given.items() if value is not None}
+        asked = asked if phase.coolant_flow is None else phase.coolant_flow
+        if asked is not None and spec.has_pump_limit:
+            values["coolant_flow"] = float(delivered_flow(spec, values["coolant_inlet"], asked))
+        found.append(dict(values))
+    return found
+
+
+def last_point(spec: MachineSpec, study: TransientStudy) -> OperatingPoint:
+    """Operating point of the last phase."""
+    inputs = InputHistory.constant(np.array([0.0, 1.0]), phase_inputs(spec, study)[-1])
+    return OperatingHistory.of(spec, inputs).at(0.0)
 
 
 @dataclass(frozen=True, slots=True)

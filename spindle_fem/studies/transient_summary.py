@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from spindle_fem.model.elastic.machine_growth import NOSE
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.solvers.transient_records import MachineTransient
-from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.transient_study import StudyResult, time_to_stay_within
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -20,8 +20,16 @@ SCHEMA = "spindle-fem/transient-result/1"
 BANDS = (1.0, 0.5, 0.1)
 
 
-def summarise(machine: PreparedMachine, result: StudyResult) -> dict[str, Any]:
-    """Phases, energy, steps and approach to the steady state, as plain data with units in the keys."""
+def summarise(
+    machine: PreparedMachine, result: StudyResult, steady: Callable[[], Mapping[str, float]]
+) -> dict[str, Any]:
+    """Phases, energy, steps and approach to the steady state, as plain data with units in the keys.
+
+    Parameters
+    ----------
+    steady : callable
+        Gives the probes [K] of the steady state that the last phase tends to; raises ``NoSteadyStateError``.
+    """
     phases = []
     for phase in result.phases:
         run = phase.transient
@@ -59,12 +67,12 @@ def summarise(machine: PreparedMachine, result: StudyResult) -> dict[str, Any]:
         "unknowns": machine.operators.n_unknowns,
         "mesh_preset": machine.spec.mesh.preset,
         "phases": phases,
-        "equilibrium": equilibrium_of(machine, result),
+        "equilibrium": equilibrium_of(result, steady),
         "versions": package_versions(),
     }
 
 
-def equilibrium_of(machine: PreparedMachine, result: StudyResult) -> dict[str, Any]:
+def equilibrium_of(result: StudyResult, steady: Callable[[], Mapping[str, float]]) -> dict[str, Any]:
     """The steady state that the last phase tends to, how far off it is and when it came near.
 
     ``shares_s`` are the times at which every probe had covered that share of
@@ -74,10 +82,10 @@ def equilibrium_of(machine: PreparedMachine, result: StudyResult) -> dict[str, A
     phase = result.phases[-1]
     run = phase.transient
     try:
-        steady = solve_prepared(machine, phase.point)
+        probes = steady()
     except NoSteadyStateError as error:
         return {"exists": False, "reason": str(error)}
-    final = np.array([steady.probes[name] for name in run.probes])
+    final = np.array([probes[name] for name in run.probes])
     way = np.abs(final - run.readings[0])
     moved = way > 0.5
     shares = {}
@@ -88,7 +96,7 @@ def equilibrium_of(machine: PreparedMachine, result: StudyResult) -> dict[str, A
         )
     return {
         "exists": True,
-        "steady_degC": {name: float(value) - ZERO_CELSIUS_K for name, value in steady.probes.items()},
+        "steady_degC": {name: float(value) - ZERO_CELSIUS_K for name, value in probes.items()},
         "left_K": float(np.abs(run.readings[-1] - final).max()),
         "shares_s": shares,
         "bands_s": {
