@@ -183,11 +183,9 @@ def main() -> None:
     overrides = [f"mesh.preset={options.preset}", f"mesh.order={options.order}", *options.set]
     spec = load_machine(options.machine, overrides)
     # A model for all speeds and thrusts of the step test and the cool-down.
-    driven = {"speed": 4500.0 * RPM, "thrust": (0.0, spec.operation.thrust)}
-    asked = [
-        SimpleNamespace(input_names=(name,), inputs=np.atleast_2d(values).T)
-        for name, values in driven.items()
-    ]
+    highest = 4500.0 * RPM
+    inputs = np.array([[highest, 0.0], [highest, spec.operation.thrust]])
+    asked = [SimpleNamespace(source="step test", probes=(), input_names=("speed", "thrust"), inputs=inputs)]
     begin = time.process_time()
     fast = fast_model_for(spec, asked)
     built = time.process_time() - begin
