@@ -360,6 +360,7 @@ def test_a_set_that_cannot_be_simulated_begins_milder(machine, tmp_path, monkeyp
     assert fit_order(problem, FitOrder((candidate,), {candidate.amplitude: 1.0}, shares=())) is None
 
 
+@pytest.mark.slow
 def test_two_things_at_once_are_both_named(machine, tmp_path):
     def high(times, told):
         return told + np.array([0.0, -2.5, 0.0])

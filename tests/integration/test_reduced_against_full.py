@@ -177,7 +177,7 @@ def test_ring_spot_and_sides_stand_for_heat_on_a_part_of_the_housing(machine, fa
 
 @pytest.mark.parametrize(
     ("length", "swing", "step"),
-    [(0.2, 0.5, 20.0), pytest.param(1.0, 3.0, None, marks=pytest.mark.slow)],
+    [(0.1, 0.25, 20.0), pytest.param(1.0, 3.0, None, marks=pytest.mark.slow)],
     ids=["short, even steps", "long, steps by their error"],
 )
 def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fast, length, swing, step):
