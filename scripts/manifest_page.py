@@ -55,6 +55,8 @@ def _lines() -> list[str]:
     lines += ["", "### What inputs drive", "", "| `drives` | what it is | unit |", "|---|---|---|"]
     lines += [f"| `{name}` | {DRIVES[name][0]} | {DRIVES[name][1]} |" for name in DRIVES_UNITS]
     lines += [
+        "| `inlet.NAME` | temperature at the inlet of a stream (`[[film]]` of kind circuit or wetted, "
+        "`BEARING.lubrication`) | `degC`, `K`, `degF` |",
         "| `heat.NAME` | heat of the `[[source]]` of that name | `W`, `kW` |",
         "| of a `[[source]]` | what its `input` names | any that its gain is made for |",
         "| of a `[network]` | the name that a boundary's `temperature` or a source's `input` gives | "

@@ -45,7 +45,8 @@ class CircuitFilm(StreamFilm):
     cylinder of the part, beside a void, stands for them and gives their heat. The walls need no
     ``[[surface]]``: cells along the flow name them ``NAME.1``, ``NAME.2`` and so on from the inlet
     (``NAME.inner.1``, ``NAME.outer.1`` of an annulus). Cells of ring grooves and of bores with several passes
-    are side by side, each with its share of the flow. Properties are those of the inlet.
+    are side by side, each with its share of the flow. Properties are those of the inlet. A
+    recording gives the inlet temperature as the input ``inlet.NAME``.
     """
 
     kind: Literal["circuit"]

@@ -5,9 +5,11 @@ from __future__ import annotations
 from spindle_fem.definition.exchange_tables import Surface
 from spindle_fem.definition.field_types import SpecModel
 
+INLET_PREFIX = "inlet."
+
 
 class StreamFilm(SpecModel):
-    """A stream with a constant flow and inlet, whose coefficients do not follow temperatures.
+    """A stream with a constant flow, whose coefficients are those at the definition's inlet temperature.
 
     A stream has ``name``, ``inlet_temperature``, ``flow`` and ``factor``.
     """
@@ -21,6 +23,11 @@ class StreamFilm(SpecModel):
     def temperature(self) -> float:
         """Temperature of the fluid at the inlet, K."""
         return self.inlet_temperature
+
+    @property
+    def inlet_input(self) -> str:
+        """Input of a recording that is its inlet temperature, in the place of the definition's."""
+        return f"{INLET_PREFIX}{self.name}"
 
     @property
     def cell_surfaces(self) -> tuple[tuple[str, ...], ...]:

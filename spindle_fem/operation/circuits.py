@@ -187,7 +187,7 @@ def wall_cells(film: StreamFilm) -> NDArray[np.int64]:
 
 
 def coolant_temperatures(
-    film: StreamFilm, conductance: Mapping[str, float], wall: Mapping[str, float]
+    film: StreamFilm, conductance: Mapping[str, float], wall: Mapping[str, float], inlet: float
 ) -> tuple[dict[str, float], float]:
     """Coolant at every wall of a circuit and at its outlet, K.
 
@@ -195,8 +195,9 @@ def coolant_temperatures(
     ----------
     conductance, wall : mapping of surface to float, [W/K], [K]
         Film times area, mean temperature.
+    inlet : float, [K]
     """
-    names, inlet = film.surface, film.inlet_temperature
+    names = film.surface
     march = CircuitMarch.of(film, np.array([conductance[name] for name in names]), wall_cells(film))
     rise = np.array([wall[name] for name in names]) - inlet
     found = inlet + march.warming @ rise

@@ -123,6 +123,8 @@ class Loads:
     heat_to : mapping of bearing to {"inner", "outer", "balls"} shares in W
     source_heat : mapping of heat source to float, [W]
         Of the definition; where it enters is the conduction problem's.
+    inlets : mapping of stream to float, [K]
+        Where its fluid enters.
     change : LoadChange
         What is in them already, but for joints, conductivities, nodal heat
         and capacities, which are the conduction problem's.
@@ -136,6 +138,7 @@ class Loads:
     warnings: tuple = field(default=())
     change: LoadChange = NO_CHANGE
     source_heat: Mapping[str, float] = field(default_factory=dict)
+    inlets: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def total_heat(self) -> float:

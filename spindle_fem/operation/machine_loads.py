@@ -198,6 +198,7 @@ class LoadsBuilder:
             fold_warnings(warnings, {*heats, *self._air_names}),
             change,
             {source.name: float(source_heat(source, point.inputs)) for source in self.spec.source},
+            {film.name: point.inlet_of(film) for film in self.spec.circuits},
         )
         return loads, coolant
 
@@ -267,7 +268,7 @@ class LoadsBuilder:
             )
             for surface in film.surface
         }
-        coolant, _ = self.circuit_coolant(film, coefficients, state)
+        coolant, _ = self.circuit_coolant(film, coefficients, state, point.inlet_of(film))
         return {
             surface: FilmLoad(
                 surface,
@@ -278,19 +279,24 @@ class LoadsBuilder:
         }
 
     def circuit_coolant(
-        self, film: StreamFilm, coefficients: Mapping[str, NDArray[np.float64]], state: FieldState
+        self,
+        film: StreamFilm,
+        coefficients: Mapping[str, NDArray[np.float64]],
+        state: FieldState,
+        inlet: float,
     ) -> tuple[dict[str, float], float]:
         """Coolant of a circuit at each of its walls and at its outlet, K.
 
         Parameters
         ----------
         coefficients : mapping of surface to (n_facets,) ndarray, [W/(m²·K)]
+        inlet : float, [K]
         """
         conductance = {
             surface: float(coefficients[surface] @ self.facet_area[surface]) for surface in film.surface
         }
         walls = {surface: self.surface_mean(surface, state) for surface in film.surface}
-        return coolant_temperatures(film, conductance, walls)
+        return coolant_temperatures(film, conductance, walls, inlet)
 
     def _gap_nodes(
         self, point: OperatingPoint, warnings: list[CodedWarning], change: LoadChange

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.recordings.standard_inputs import standard_inputs
 
 
@@ -51,6 +52,10 @@ class OperatingPoint:
             **{f"heat.{name}": heat for name, heat in self.extra_heat.items()},
             **self.beside,
         }
+
+    def inlet_of(self, film: StreamFilm) -> float:
+        """Inlet temperature of a stream, K: as recorded, else the definition's."""
+        return self.beside.get(film.inlet_input, film.inlet_temperature)
 
     @property
     def coldest(self) -> float:

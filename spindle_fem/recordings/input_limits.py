@@ -12,7 +12,7 @@ from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.standard_inputs import standard_inputs
-from spindle_fem.units import ZERO_CELSIUS_K
+from spindle_fem.units import TEMPERATURE_UNIT, ZERO_CELSIUS_K
 
 # Air about machines, K: what industrial electronics beside them is made for.
 USUAL_AMBIENT = (233.15, 358.15)
@@ -48,7 +48,8 @@ def _unknown_probes(spec: MachineSpec, recording: Recording) -> Iterator[Spindle
 
 
 def _faults(spec: MachineSpec, recording: Recording) -> Iterator[SpindleFemError]:
-    source, known = recording.source, (*standard_inputs(spec), *spec.source_inputs)
+    inlets = tuple(film.inlet_input for film in spec.circuits)
+    source, known = recording.source, (*standard_inputs(spec), *inlets, *spec.source_inputs)
     for name in recording.input_names:
         if name not in known and not name.startswith("heat."):
             yield RecordingError(
@@ -56,6 +57,9 @@ def _faults(spec: MachineSpec, recording: Recording) -> Iterator[SpindleFemError
                 f'drives "{name}", which a machine with geometry does not have.',
                 f"Allowed: {', '.join(known)}, heat.<source>.",
             )
+    for name, unit in zip(recording.input_names, recording.input_units, strict=True):
+        if name in inlets and unit != TEMPERATURE_UNIT:
+            yield RecordingError(source, f'"{name}" is in {unit}.', "Allowed: a temperature.")
     if "speed" not in recording.input_names:
         yield RecordingError(
             source, "no channel drives the speed.", 'Add an input channel with drives = "speed".'
@@ -90,6 +94,11 @@ def _unusual(spec: MachineSpec, recording: Recording) -> Iterator[str]:
         fluid = coolant_by_name(spec.coolant.fluid)
         limits = (fluid.lowest_temperature, fluid.highest_temperature)
         yield from _outside(recording, "coolant_inlet", limits, f"the range of {spec.coolant.fluid}")
+    elif any(np.ptp(_ends(recording, name)) > 0.0 for name in ("coolant_inlet", "coolant_flow")):
+        inlets = " or ".join(film.inlet_input for film in spec.circuits)
+        yield "coolant_inlet and coolant_flow are those of a [channel], which this machine does not have" + (
+            f"; {inlets} is the inlet temperature of a stream" if inlets else ""
+        )
 
 
 def _outside(recording: Recording, name: str, limits: tuple[float, float], what: str) -> Iterator[str]:

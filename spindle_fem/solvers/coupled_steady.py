@@ -263,7 +263,10 @@ def circuit_outlets(machine: PreparedMachine, solution: ConductionSolution, load
         return {}
     field = machine.field_state(solution.temperature, {})
     films = {name: film.coefficient for name, film in loads.films.items()}
-    return {film.name: machine.builder.circuit_coolant(film, films, field)[1] for film in circuits}
+    return {
+        film.name: machine.builder.circuit_coolant(film, films, field, loads.inlets[film.name])[1]
+        for film in circuits
+    }
 
 
 def circuit_mismatch(machine: PreparedMachine, solution: ConductionSolution, loads: Loads) -> float:
@@ -275,7 +278,7 @@ def circuit_mismatch(machine: PreparedMachine, solution: ConductionSolution, loa
             # A term that shifts the fluid of one wall says nothing of the coolant that goes on.
             continue
         heat = np.array([solution.balance.films[surface] for surface in film.surface])
-        rise = capacity_rate(film) * (outlet - film.inlet_temperature)
+        rise = capacity_rate(film) * (outlet - loads.inlets[name])
         worst = max(worst, abs(float(heat.sum()) - rise) / max(float(np.abs(heat).sum()), 1.0e-12))
     return worst
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.stream_films import INLET_PREFIX
 from spindle_fem.effects.framework.term import COVARIATE, RecordedHeat
 from spindle_fem.errors import RecordingError, did_you_mean
 from spindle_fem.machine.geometry.coolant_path import CoolantPath
@@ -45,12 +46,12 @@ class OperatingHistory:
     inputs : InputHistory
         Columns named ``speed`` [rad/s], ``thrust`` [N], ``ambient``,
         ``coolant_inlet`` [K], ``coolant_flow`` [m³/s], ``heat.<place>`` [W],
-        ``covariate.<column>``, those of heat sources;
+        ``covariate.<column>``, ``inlet.<stream>`` [K], those of heat sources;
         before the first time the first value holds, after the last one the last.
     defined : OperatingPoint
         The definition's own values.
     followed : tuple of str
-        Inputs that the machine's heat sources follow.
+        Inputs that the machine's heat sources and the inlets of its streams follow.
     heated : tuple of str
         Inputs ``heat.<place>`` that no heat source takes.
     path : CoolantPath or None
@@ -72,7 +73,7 @@ class OperatingHistory:
         RecordingError
             An input that a machine with geometry does not have.
         """
-        followed = spec.source_inputs
+        followed = (*spec.source_inputs, *(film.inlet_input for film in spec.circuits))
         for name in inputs.names:
             if name not in (*FIELD_OF, *followed) and not name.startswith((HEAT, COVARIATE)):
                 raise RecordingError(
@@ -111,7 +112,7 @@ class OperatingHistory:
 
     def _resolution(self, column: int, temperature: float = TEMPERATURE_RESOLUTION) -> float:
         name = self.inputs.names[column]
-        if name in TEMPERATURES:
+        if name in TEMPERATURES or name.startswith(INLET_PREFIX):
             return temperature
         share = RELATIVE_RESOLUTION.get(name, HEAT_RESOLUTION)
         largest = float(np.abs(self.inputs.values[:, column]).max())

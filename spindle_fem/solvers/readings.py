@@ -116,15 +116,17 @@ class ReadingRows:
             if film.name == name:
                 break
             first += len(film.surface)
-        walls = outputs[:, first : first + len(film.surface)] - film.inlet_temperature
+        points = [coolant_at(float(time))[0] for time in times]
+        inlet = np.array([point.inlet_of(film) for point in points])
+        walls = outputs[:, first : first + len(film.surface)] - inlet[:, None]
         areas = np.array([machine.builder.facet_area[name].sum() for name in film.surface])
-        speeds = np.array([coolant_at(float(time))[0].speed for time in times])
+        speeds = np.array([point.speed for point in points])
         found = np.empty(len(times))
         for speed in np.unique(speeds):
             value = film.factor.value * stream_answer(film, float(speed)).coefficient
             weights = CircuitMarch.of(film, value * areas, wall_cells(film)).outlet
             then = speeds == speed
-            found[then] = film.inlet_temperature + walls[then] @ weights
+            found[then] = inlet[then] + walls[then] @ weights
         return found
 
     def _coolant_outlet(self, outputs: Array, times: Array, coolant_at: CoolantAt) -> Array:

@@ -185,6 +185,61 @@ def test_a_transient_balances_and_reads_the_outlet(machine):
     assert outlet[1] < outlet[0]
 
 
+WARM = 293.15
+
+
+def test_every_model_takes_a_recorded_inlet(machine, fast):
+    film = machine.spec.circuits[0]
+    point = replace(OperatingPoint.of(machine.spec), beside={film.inlet_input: WARM})
+    full = solve_coupled(machine, point)
+    heat = sum(full.solution.balance.films[name] for name in film.surface)
+    outlet = WARM + heat / duct_flow(film).capacity_rate
+    network = solve_machine_network(build_machine_network(machine.spec), point)
+    assert network.boundary_heat["bore"] == pytest.approx(heat, rel=0.06)
+    # warmer water takes less
+    assert heat < 0.8 * _heat(machine, solve_coupled(machine, OperatingPoint.of(machine.spec)))
+    run = _driven(fast, point, np.linspace(0.0, 4.0e6, 4000), 1.0e4)
+    assert run.temperature[-1, fast.channels.index("BORE_OUT")] == pytest.approx(outlet, abs=2e-3)
+    state = machine.field_state(full.solution.temperature, {})
+    for name in ("F1.inner_raceway", "bore.1", "bore.8"):
+        expected = machine.builder.surface_mean(name, state)
+        assert fast.model.place(name) @ run.states[-1] == pytest.approx(expected, abs=5e-3), name
+
+
+def test_transients_follow_a_recorded_inlet(machine, fast):
+    film, point = machine.spec.circuits[0], OperatingPoint.of(machine.spec)
+    start = start_from(solve_coupled(machine, point))
+    times = np.linspace(0.0, 1800.0, 61)
+    inputs = InputHistory.constant(
+        times[[0, -1]], {"speed": point.speed, "thrust": point.thrust, film.inlet_input: WARM}
+    )
+    run = simulate_full(
+        machine, inputs, sample_times=[0.0, 900.0, 1800.0], start=start, options=TransientOptions(error=0.05)
+    )
+    assert run.energy.imbalance_relative < 1e-8
+    column = [probe.name for probe in machine.spec.probe].index("BORE_OUT")
+    settled = _driven(fast, point, np.linspace(0.0, 4.0e6, 4000), 1.0e4)
+    warm = replace(point, beside={film.inlet_input: WARM})
+    quick = _driven(fast, warm, times, 60.0, start=settled.states[-1])
+    found = quick.temperature[[0, 30, 60], fast.channels.index("BORE_OUT")]
+    assert run.readings[:, column] == pytest.approx(found, abs=0.03)
+    assert run.readings[0, column] > circuit_outlets(machine, *_solved(machine))["bore"] + 5.0
+
+
+def _heat(machine, found):
+    return sum(found.solution.balance.films[name] for name in machine.spec.circuits[0].surface)
+
+
+def _driven(fast, point, times, step, start=293.15):
+    given = (point.speed, point.thrust, point.ambient_temperature)
+    given = (*given, point.coolant_inlet_temperature, point.coolant_flow, *point.beside.values())
+    names = (*STANDARD, *point.beside)
+    drive = make_drive(
+        times, names, np.tile(given, (times.size, 1)), np.ones(len(names), dtype=bool), largest_step=step
+    )
+    return simulate_fast(fast, drive, start)
+
+
 def _solved(machine):
     found = solve_coupled(machine, OperatingPoint.of(machine.spec))
     return found.solution, found.loads

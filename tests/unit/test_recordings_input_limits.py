@@ -67,3 +67,31 @@ def test_unknown_probes_are_told_beside_unknown_inputs(spec):
     faulty = replace(sound, input_names=names, probes=("FORNT", *sound.probes[1:]))
     with pytest.raises(FaultsError, match=r'drives "ambiente".*\n.*\n.*reads "FORNT"'):
         require_possible_inputs(spec, faulty)
+
+
+def test_the_inlet_of_a_stream_is_an_input_and_that_of_no_channel_is_said(tmp_path):
+    page = tmp_path / "cooled.toml"
+    page.write_text(
+        'schema = "spindle-fem/machine/1"\nbase = "groove_spindle"\nname = "cooled"\n'
+        '[[film]]\nkind = "circuit"\nname = "bore"\npart = "shaft"\ndiameter = "20 mm"\nz = ["0 mm", "100 mm"]\nfluid = "water"\n'
+        'inlet_temperature = "20 degC"\nflow = "1 L/min"\n'
+    )
+    spec = load_machine(page)
+    recording = recorded(spec)
+    assert require_possible_inputs(spec, recording) == ()
+    column = recording.input_names.index("coolant_inlet")
+
+    def named(name, unit="kelvin"):
+        names, units = list(recording.input_names), list(recording.input_units)
+        names[column], units[column] = name, unit
+        values = recording.inputs.copy()
+        values[-1, column] += 5.0
+        return replace(recording, input_names=tuple(names), input_units=tuple(units), inputs=values)
+
+    assert require_possible_inputs(spec, named("inlet.bore")) == ()
+    (said,) = require_possible_inputs(spec, named("coolant_inlet"))
+    assert said.endswith("this machine does not have; inlet.bore is the inlet temperature of a stream")
+    with pytest.raises(RecordingError, match=r'"inlet\.bore" is in watt\. Allowed: a temperature'):
+        require_possible_inputs(spec, named("inlet.bore", "watt"))
+    with pytest.raises(RecordingError, match=r'drives "inlet\.bor".*inlet\.bore'):
+        require_possible_inputs(spec, named("inlet.bor"))

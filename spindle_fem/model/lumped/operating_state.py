@@ -351,7 +351,7 @@ def _circuit(machine: MachineNetwork, film: StreamFilm, point: OperatingPoint) -
     cell = np.repeat(wall_cells(film), [len(item.node) for item in patches])
     conductance = 1.0 / (patch.resistance + 1.0 / (float(value[0]) * patch.area))
     march = CircuitMarch.of(film, conductance, cell)
-    return CircuitLaw(patch, conductance, march.warming, film.inlet_temperature, film.name)
+    return CircuitLaw(patch, conductance, march.warming, point.inlet_of(film), film.name)
 
 
 def _pumping(machine: MachineNetwork, point: OperatingPoint) -> Array:

@@ -144,7 +144,7 @@ def drive_of_recording(
         f'"{name}" is not recorded: the definition\'s value is used'
         + (", as far as the pump drives it" if name == "coolant_flow" and spec.has_pump_limit else "")
         for name in known
-        if name not in recording.input_names
+        if name not in recording.input_names and (spec.coolant is not None or "coolant" not in name)
     ]
     names = (*known, *(n for n in recording.input_names if n not in known))
     history = recording.input_history()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
 from spindle_fem.effects.framework.term import RecordedHeat, Term
 from spindle_fem.errors import SpecError
@@ -63,12 +64,17 @@ class SpindleInputs:
         self.bearings = tuple(bearing.name for _, bearing in spec.bearings)
         self.channels = tuple(item.name for item in (*spec.probe, *spec.displacement_sensor))
         self.heat_places = tuple(f"{name}.{side}" for name in self.bearings for side in SIDES)
-        self.fixed_fluids = tuple(
-            dict.fromkeys(f.temperature for f in spec.film if f.temperature != "ambient")
-        )
+        still = [film for film in spec.film if not isinstance(film, StreamFilm)]
+        self.fixed_fluids = tuple(dict.fromkeys(f.temperature for f in still if f.temperature != "ambient"))
         fixed = tuple(f"fixed[{number}]" for number in range(len(self.fixed_fluids)))
-        self.load_names = (*self.heat_places, "ambient", "coolant_inlet", "coolant_friction", *fixed)
-        self._fluids = {f"film.{surface}": film.temperature for film in spec.film for surface in film.surface}
+        self.inlets = {film.inlet_input: film.inlet_temperature for film in spec.circuits}
+        self.load_names = (
+            *self.heat_places, "ambient", "coolant_inlet", "coolant_friction", *fixed, *self.inlets
+        )  # fmt: skip
+        self._fluids = {f"film.{surface}": film.temperature for film in still for surface in film.surface}
+        self._streams = {
+            f"film.{surface}": film.inlet_input for film in spec.circuits for surface in film.surface
+        }
 
     def channel_operators(self, model: ThermalModel) -> ChannelOperators | None:
         """The coolant's channel, if the machine has one."""
@@ -96,6 +102,8 @@ class SpindleInputs:
     # ------------------------------------------------------------------- fluids
     def fluid_input(self, coefficient: str) -> str:
         """Load input that is the fluid of a film."""
+        if coefficient in self._streams:
+            return self._streams[coefficient]
         temperature = self._fluids[coefficient]
         return "ambient" if temperature == "ambient" else f"fixed[{self.fixed_fluids.index(temperature)}]"
 
@@ -105,6 +113,8 @@ class SpindleInputs:
 
     def fluid_temperature(self, coefficient: str, inputs: Mapping[str, Any]) -> Any:
         """Temperature that a film's heat counts from, K."""
+        if coefficient in self._streams:
+            return inputs.get(self._streams[coefficient], self.inlets[self._streams[coefficient]])
         temperature = self._fluids[coefficient]
         return inputs["ambient"] if temperature == "ambient" else temperature
 
@@ -151,6 +161,8 @@ class SpindleInputs:
         found[:, self.load_names.index("coolant_friction")] = 1.0
         for number, temperature in enumerate(self.fixed_fluids):
             found[:, self.load_names.index(f"fixed[{number}]")] = temperature
+        for name, temperature in self.inlets.items():
+            found[:, self.load_names.index(name)] = column.get(name, temperature)
         by = {}
         for name, part in friction_by.items():
             by[name] = np.zeros_like(found)

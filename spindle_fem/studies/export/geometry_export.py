@@ -264,6 +264,8 @@ def _fluid_load(fast: FastModel, name: str, position: dict[str, int]) -> PowerLo
     if name.startswith("fixed["):
         number = int(name.removeprefix("fixed[").removesuffix("]"))
         return PowerLoad(name, CELSIUS, -1, fast.inputs.fixed_fluids[number] - ZERO_CELSIUS_K)
+    if name in fast.inputs.inlets:
+        return PowerLoad(name, CELSIUS, -1, fast.inputs.inlets[name] - ZERO_CELSIUS_K)
     # Without a coolant its inlet drives nothing.
     return PowerLoad(name, "1", -1, float(name == "coolant_friction"))
 
