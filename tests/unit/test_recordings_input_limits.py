@@ -73,7 +73,8 @@ def test_the_inlet_of_a_stream_is_an_input_and_that_of_no_channel_is_said(tmp_pa
     page = tmp_path / "cooled.toml"
     page.write_text(
         'schema = "spindle-fem/machine/1"\nbase = "groove_spindle"\nname = "cooled"\n'
-        '[[film]]\nkind = "circuit"\nname = "bore"\npart = "shaft"\ndiameter = "20 mm"\nz = ["0 mm", "100 mm"]\nfluid = "water"\n'
+        '[[film]]\nkind = "circuit"\nname = "bore"\npart = "shaft"\ndiameter = "20 mm"\n'
+        'z = ["0 mm", "100 mm"]\nfluid = "water"\n'
         'inlet_temperature = "20 degC"\nflow = "1 L/min"\n'
     )
     spec = load_machine(page)
