@@ -180,7 +180,7 @@ class Readable:
         content: Mapping[str, Any],
         faults: Iterable[SpindleFemError],
     ) -> Readable:
-        """Of sound tables, the file's tables before and after completion, and the faults found so far."""
+        """Places whose tables can be read, from the file before and after completion and its faults."""
         places = [fault.where for fault in faults if not fault.where.endswith(_NO_GEOMETRY)]
         declared = Declared.of(content)
         owners = {part.name: (f"part.{part.name}",) for part in spec.part}

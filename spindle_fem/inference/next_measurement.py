@@ -97,7 +97,7 @@ class Option:
 
     @property
     def unit(self) -> str:
-        """Of the difference, as keys have it."""
+        """Unit of the difference, as in the names of keys."""
         return "um" if self.displaced else "K"
 
     @property

@@ -289,7 +289,7 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
 
 
 def _with_displacements_of(slow: SlowError, predictor: Predictor) -> SlowError:
-    """With what is expected of displacements that it does not know: that of kelvins is none of theirs."""
+    """A slow error, the usual one for each displacement that it lacks: one in K says nothing of µm."""
     known = {key for key, _, _ in slow.channels}
     usual = expected_slow_error(predictor).channels
     new = tuple(item for item in usual if item[0] < 0 and item[0] not in known)

@@ -58,7 +58,7 @@ class StepPlace:
 
     @property
     def sign(self) -> float:
-        """Of a level in terms of what it adds."""
+        """Sign of what a level adds: -1 where the effect takes something away."""
         return -1.0 if self.less else 1.0
 
 

@@ -40,7 +40,7 @@ def channel_warnings(spec: MachineSpec, flow: float, pressure_drop: float) -> li
 
 
 def flow_warnings(spec: MachineSpec) -> list[CodedWarning]:
-    """Those of channel and circuits at the definition's operating point, before anything is solved."""
+    """Warnings of channel and circuits at the definition's operating point, before anything is solved."""
     found: list[CodedWarning] = []
     if spec.channel is not None and spec.coolant is not None:
         point = OperatingPoint.of(spec)

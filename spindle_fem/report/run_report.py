@@ -167,7 +167,7 @@ def _equilibrium(summary: Mapping[str, Any]) -> list[Any]:
 
 
 def _drawn(illustrations: Mapping[str, Illustration | None], *names: str) -> list[Illustration]:
-    """Those of some pictures that there are."""
+    """The named pictures, as far as they were made."""
     found = (illustrations.get(name) for name in names)
     return [picture for picture in found if picture is not None]
 

@@ -207,7 +207,7 @@ def _begin(
 
 
 def _grown(recording: Recording, fast: FastModel) -> Recording:
-    """With displacements among the readings, as a diagnosis takes them: of machines with geometry."""
+    """The recording as a diagnosis takes it: of machines with geometry, displacements among the readings."""
     return with_displacements(recording) if fast.network is None else recording
 
 
@@ -239,7 +239,7 @@ class _Teller:
         self._latest: Judgement | None = None
 
     def of(self, judgements: Sequence[Judgement], window: RecordingWindow) -> Iterator[dict[str, Any]]:
-        """Those of some instants that are worth a line."""
+        """Lines for judgements of successive instants: where the state changes, and at every heartbeat."""
         for item in judgements:
             self._latest, said = item, self._said
             if (

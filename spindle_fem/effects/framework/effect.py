@@ -204,7 +204,7 @@ class Candidate:
 
     @property
     def free(self) -> dict[str, TermParameter]:
-        """Those that are fitted."""
+        """Parameters that are fitted, by name."""
         return {name: item for name, item in self.parameters.items() if item.sigma > 0.0}
 
 
@@ -406,7 +406,7 @@ class IntervalEffect(Effect):
         return self.interval_forms
 
     def forms(self, machine: MachineView) -> tuple[Candidate, ...]:
-        """Those that follow laws; candidates for intervals come from the data."""
+        """Candidates that follow laws; those for intervals come from the data."""
         return ()
 
     @abstractmethod

@@ -188,7 +188,7 @@ class FollowedPreload:
         return answer
 
     def logarithms(self, quantities: NDArray) -> NDArray:
-        """Of friction and both ball conductances over those at assembly, (n_bearings, 3, k)."""
+        """Logarithms of friction and both ball conductances, over those at assembly, (n_bearings, 3, k)."""
         found = np.empty((len(self.mounted.friction.bearings), 3, quantities.shape[1]), quantities.dtype)
         first = 0
         for group in self.mounted.sets:

@@ -100,9 +100,9 @@ class SampledResponse:
         return value, slope + self.line[1 : 1 + count].T
 
     def within(self, coordinates: Array, inputs: Array, beyond: float) -> tuple[Array, Array]:
-        """As :meth:`at`, but held at ``beyond`` times 1 and the span of the samples away from these.
+        """As :meth:`at`, but values stay within ``beyond`` times (1 + span of the samples) of the samples.
 
-        Held values do not change with the coordinates.
+        A value held at that limit does not change with the coordinates.
         """
         value, slope = self.at(coordinates, inputs)
         reach = beyond * (1.0 + np.ptp(self.ends, axis=0))

@@ -188,7 +188,7 @@ class SeatBodies:
         return {}
 
     def of(self, bearings: Sequence[int]) -> SeatBodies:
-        """Those of some bearings, as if no others pressed on the same bodies."""
+        """Compliance of the seats of some bearings, as if no others pressed on the same bodies."""
         own = np.asarray(bearings)
         seats = (2 * own[:, None] + np.arange(2)).ravel()
         return SeatBodies(
