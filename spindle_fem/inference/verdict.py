@@ -403,9 +403,9 @@ def _with_needed_events(
 ) -> list[Hypothesis]:
     """Sets without those of whose laws some, or none, leave no more of the readings than may be left of them.
 
-    Neither in units of the noise nor of the errors that were expected before these readings. What may come
-    and go at any time fits some of whatever a coarse picture leaves, and follows held-out readings itself:
-    that they become likelier with it says little.
+    Neither in units of the noise nor of the errors that were expected before these readings, and held-out
+    ones not much more than the set. What may come and go at any time fits some of whatever a coarse picture
+    leaves, and follows held-out readings itself: that they become a little likelier with it says nothing.
     """
 
     def only_laws(item: Hypothesis) -> frozenset:
@@ -418,6 +418,7 @@ def _with_needed_events(
         return all(
             np.sqrt(other.expected_misfit) > tuned.UNEXPLAINED_MISFIT
             or max(left(other.fit), beyond(other.fit)) > tuned.MOST_LEFT
+            or 0.0 < beyond(item.fit) < (1.0 - tuned.IMPROVEMENT_OF_EVENTS) * beyond(other.fit)
             for other in plain
             if other.keys <= only_laws(item)
         )
