@@ -26,6 +26,7 @@ from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
 from spindle_fem.model.reduced.drive import drive_of_recording
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for, options_for, recentred_model
+from spindle_fem.model.reduced.resolved_jumps import with_resolved_jumps
 from spindle_fem.operation.bearing_heat import at_assembly_size
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import Comparison, compare
@@ -116,7 +117,7 @@ def _simulate_geometry(
         earlier_recordings = [with_displacements(item) for item in calibration]
         earlier = Predictor(fast, earlier_recordings, effects=effects, at_stamps=True)
         result = fit_parameters(earlier, progress=progress)
-    drives = (drive_of_recording(spec, recording),)
+    drives = (with_resolved_jumps(drive_of_recording(spec, recording)),)
     predictor = Predictor(fast, [recording], effects=effects, at_stamps=True, drives=drives)
     factors = {} if result is None else result.factors
     if result is not None and followed.follows_preload:

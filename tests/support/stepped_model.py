@@ -10,6 +10,7 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.model.reduced.drive import drive_of_recording
 from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
+from spindle_fem.model.reduced.resolved_jumps import with_resolved_jumps
 from spindle_fem.studies.export.export_machine import machine_state_space
 from spindle_fem.studies.export.exported_files import file_writer
 from spindle_fem.studies.export.portable_model import PortableModel
@@ -58,7 +59,7 @@ def told_and_found(folder, machine, overrides, recording):
     for name in ("model.npz", "model.c"):
         file_writer(folder / name)(space, folder / name)
     spec = load_machine(machine, overrides)
-    drive = drive_of_recording(spec, recording)
+    drive = with_resolved_jumps(drive_of_recording(spec, recording))
     start = drive.first("ambient")
     fast = fast_model_for(spec, [recording], as_given=True)
     told = simulate_fast(fast, drive, start).temperature[1:] - ZERO_CELSIUS_K
