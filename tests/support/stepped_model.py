@@ -52,6 +52,11 @@ def readings_along(model, drive, given, most_steps=None):
     return np.array(found)
 
 
+def resolved_run(fast, drive, start, **given):
+    """A drive as simulate runs it, with short steps after jumps; exported models take theirs."""
+    return simulate_fast(fast, with_resolved_jumps(drive), start, **given)
+
+
 def told_and_found(folder, machine, overrides, recording):
     """Outputs at a recording's rows (N - 1, p): by simulate, by the exported machine in Python, in C."""
     # one export, in both forms
@@ -59,10 +64,10 @@ def told_and_found(folder, machine, overrides, recording):
     for name in ("model.npz", "model.c"):
         file_writer(folder / name)(space, folder / name)
     spec = load_machine(machine, overrides)
-    drive = with_resolved_jumps(drive_of_recording(spec, recording))
+    drive = drive_of_recording(spec, recording)
     start = drive.first("ambient")
     fast = fast_model_for(spec, [recording], as_given=True)
-    told = simulate_fast(fast, drive, start).temperature[1:] - ZERO_CELSIUS_K
+    told = resolved_run(fast, drive, start).temperature[1:] - ZERO_CELSIUS_K
     model = PortableModel.load(folder / "model.npz")
     rows = np.searchsorted(drive.grid, drive.times[1:] - 1e-7) - 1
     found = readings_along(model, drive, {0: start - ZERO_CELSIUS_K})[rows]

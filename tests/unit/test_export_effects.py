@@ -11,14 +11,13 @@ from spindle_fem.model.lumped.network_view import day_of_a_network, view_of_netw
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.defined_effects import ActiveEffects
 from spindle_fem.model.reduced.network_inputs import fast_network
-from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.operation.preload_mechanics import machine_view
 from spindle_fem.studies.export.effect_export import ExportedEffects
 from spindle_fem.studies.export.geometry_export import geometry_state_space
 from spindle_fem.studies.export.network_export import network_state_space
 from spindle_fem.units import ZERO_CELSIUS_K
 from tests.support.lumped_spindle import RPM, drive_of
-from tests.support.stepped_model import readings_along
+from tests.support.stepped_model import readings_along, resolved_run
 from tests.support.written_texts import network_text
 
 # Largest difference from simulate, K; what an effect changes at least.
@@ -47,7 +46,7 @@ def with_size(candidate):
 
 def told_by_simulate(fast, drive, candidate):
     effects = ActiveEffects((candidate,))
-    run = simulate_fast(
+    run = resolved_run(
         fast, drive, START + ZERO_CELSIUS_K, parameters=effects.times_parameters({}), terms=effects.terms
     )
     found = run.temperature[1:].copy()
@@ -70,7 +69,7 @@ def refusal(candidate, export):
 
 def held_effects(fast, drive, candidates, export):
     """Names of effects whose exports agree; what is not agreed on fails, and refusals say why."""
-    plain = simulate_fast(fast, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
+    plain = resolved_run(fast, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
     found = set()
     for candidate in map(with_size, candidates):
         refused = refusal(candidate, export)

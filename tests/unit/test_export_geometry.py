@@ -9,7 +9,6 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.machine_spec import HeatSource
 from spindle_fem.machine.view.defined_point import at_the_defined_point
 from spindle_fem.model.reduced.film_heat import FilmHeat, tabulated_machine
-from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.friction_map import tabulate_friction
 from spindle_fem.studies.export import export_machine as exported
@@ -21,7 +20,7 @@ from spindle_fem.studies.export.source_export import source_loads
 from spindle_fem.studies.export.state_space import ModelInput
 from spindle_fem.units import ZERO_CELSIUS_K
 from tests.support.lumped_spindle import RPM, drive_of, lumped_model, with_natural_film
-from tests.support.stepped_model import c_readings_along, needs_compiler, readings_along
+from tests.support.stepped_model import c_readings_along, needs_compiler, readings_along, resolved_run
 
 # Largest difference from simulate, K.
 AGREEMENT = 1e-3
@@ -53,7 +52,7 @@ def drive():
 
 @pytest.fixture(scope="module")
 def simulated(fast, drive):
-    return simulate_fast(fast, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
+    return resolved_run(fast, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
 
 
 def test_agrees_with_simulate(space, drive, simulated):
@@ -98,7 +97,7 @@ def test_files_hold_it_all(space, tmp_path):
 
 def agrees(fast, drive):
     """Whether an exported model's readings along a drive are those of simulate; the model."""
-    told = simulate_fast(fast, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
+    told = resolved_run(fast, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
     model = geometry_state_space(fast, "lumped", 4500.0 * RPM).model()
     assert np.abs(readings_along(model, drive, {0: START}) - told).max() < AGREEMENT
     return model
@@ -151,7 +150,7 @@ def warmed():
 def test_a_film_follows_the_wall(warmed, drive, tmp_path):
     space, path = geometry_state_space(warmed, "lumped", 4500.0 * RPM), tmp_path / "model.c"
     model = space.model()
-    told = simulate_fast(warmed, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
+    told = resolved_run(warmed, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
     found = readings_along(model, drive, {0: START})
     assert np.abs(found - told).max() < AGREEMENT
     file_writer(path)(space, path)
@@ -216,7 +215,7 @@ def test_sources_are_inputs_or_tables(fast, drive, tmp_path):
     power = with_input(drive, "motor_power", np.linspace(400.0, 900.0, drive.steps.size))
     space, path = geometry_state_space(heated, "lumped", 4500.0 * RPM), tmp_path / "model.c"
     model = space.model()
-    told = simulate_fast(heated, power, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
+    told = resolved_run(heated, power, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
     named = {item["name"]: (item["unit"], item["default"]) for item in model.header["inputs"]}
     assert (named["motor_power"], named["heat.seal"]) == (("W", pytest.approx(120.0)), ("W", 20.0))
     every = with_input(power, "heat.seal", np.full(drive.steps.size, 20.0))

@@ -5,6 +5,7 @@ import pytest
 
 from spindle_fem.model.reduced import resolved_jumps
 from spindle_fem.model.reduced.drive import STANDARD, inputs_at, make_drive
+from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.resolved_jumps import shorter_steps, with_resolved_jumps
 
 HELD = np.array([True, True, False, False, True])
@@ -53,7 +54,8 @@ def test_inputs_are_what_they_were_at_all_times():
 
 
 @pytest.mark.parametrize(
-    ("speed", "inlet"), [(300.0 + 2.0 * (MINUTES > 1200.0), 288.15), (300.0, 288.15 + 0.1 * (MINUTES > 1200.0))]
+    ("speed", "inlet"),
+    [(300.0 + 2.0 * (MINUTES > 1200.0), 288.15), (300.0, 288.15 + 0.1 * (MINUTES > 1200.0))],
 )
 def test_what_does_not_matter_divides_nothing(speed, inlet):
     drive = drive_of(speed, inlet)
@@ -102,3 +104,18 @@ def test_a_mode_that_jumps_is_followed_within_three_thousandths(rate):
     if rate == 0.1:
         # a first minute in one step is what this is about
         assert abs(march([60.0]) * rate - (1.0 - np.exp(-6.0))) > 0.05
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_rows_a_minute_apart_read_as_rows_a_second_apart(fast, held):
+    speed = np.select([MINUTES < 300.0, MINUTES < 1200.0, MINUTES < 1800.0], [450.0, 0.0, 200.0], 450.0)
+    rows = drive_of(speed, held=np.array([held, True, False, False, True]))
+    seconds = np.arange(0.0, 3601.0, 1.0)
+    values = np.column_stack([inputs_at(rows, seconds)[name] for name in STANDARD])
+    # just after each second, as the rows have it, and straight between seconds
+    fine = make_drive(seconds, STANDARD, values, np.array([held, True, False, False, True]))
+    meant = simulate_fast(fast, fine, 293.15).temperature[::60]
+    found = simulate_fast(fast, with_resolved_jumps(rows), 293.15).temperature
+    coarse = simulate_fast(fast, rows, 293.15).temperature
+    assert np.abs(found - meant).max() < 5e-3
+    assert np.abs(coarse - meant).max() > 0.05

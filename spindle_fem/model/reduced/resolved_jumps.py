@@ -12,9 +12,9 @@ from spindle_fem.model.reduced.drive import PREDICTED, Drive, classes_of
 
 Array = NDArray[np.float64]
 
-# Jumps that count: kelvins, and shares of the largest value of an input. What smaller ones leave of a minute's
-# step is below a hundredth of a kelvin: a jump of a router spindle from standstill to 12,000 rpm leaves half a
-# kelvin, and heat follows speed by its power of two at most.
+# Jumps that count: kelvins, and shares of the largest value of an input. What smaller ones leave of a step of
+# a minute is below a hundredth of a kelvin: a jump of a router spindle from standstill to 12,000 rpm leaves
+# half a kelvin, and heat follows speed by its power of two at most.
 LEAST = {"ambient": 1.0, "coolant_inlet": 0.2}
 LEAST_SHARE = {"speed": 0.01, "coolant_flow": 0.02, "thrust": 0.05}
 OTHER_SHARE = 0.02
@@ -25,8 +25,8 @@ FIRST, GROWTH = 0.5, 0.5
 # Largest change of an input within a step, in jumps that count, as heat is no straight line over the speed;
 # and the shortest step that this makes [s].
 MOST_JUMPS, SHORTEST = 10.0, 2.0
-# Operators and lengths of steps: each pair has matrices of its own, together half a gigabyte. Jumps count from
-# so many times their least size at most.
+# Operators and lengths of steps: each pair has matrices of its own, together half a gigabyte. Jumps count
+# from so many times their least size at most.
 MOST_KINDS, LARGEST_FACTOR = 500, 64.0
 
 
@@ -112,11 +112,26 @@ def _divided(drive: Drive, least: Array) -> Drive:
 def _least(drive: Drive) -> Array:
     """Smallest jump of every input that counts, (m,); none of covariates, which only terms follow."""
     largest = np.maximum(np.abs(drive.start).max(axis=0), np.abs(drive.end).max(axis=0))
-    found = [
-        np.inf
-        if name.startswith(COVARIATE)
-        else LEAST.get(name, LEAST_SHARE.get(name, OTHER_SHARE) * max(float(most), 1e-12))
-        for name, most in zip(drive.names, largest, strict=True)
-    ]
-    return np.array(found)
+    return np.array([least_jump(*item) for item in zip(drive.names, largest.tolist(), strict=True)])
 
+
+def least_jump(name: str, largest: float) -> float:
+    """Smallest jump of an input that counts, in its unit.
+
+    Parameters
+    ----------
+    name : str
+    largest : float
+        Value that it takes.
+
+    >>> least_jump("speed", 1000.0), least_jump("coolant_inlet", 293.15)
+    (10.0, 0.2)
+    """
+    if name.startswith(COVARIATE):
+        return np.inf
+    return LEAST.get(name, LEAST_SHARE.get(name, OTHER_SHARE) * max(abs(largest), 1e-12))
+
+
+def rule_of_jumps() -> dict[str, float]:
+    """What programs beside this one need to divide their steps alike."""
+    return {"bend": BEND, "first_s": FIRST, "growth": GROWTH, "most": MOST_JUMPS, "shortest_s": SHORTEST}

@@ -152,6 +152,7 @@ def _c_content(space: StateSpace) -> dict[str, Any]:
         **plain,
         "loads": header["loads"],
         "longest_step_s": header["longest_step_s"],
+        "jumps": header.get("jumps"),
         "scheme_text": SCHEME_TEXTS[header["scheme"]],
         "exact": exact,
         "states": len(space.arrays["uniform"]),

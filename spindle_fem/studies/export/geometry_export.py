@@ -9,6 +9,7 @@ from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
 from spindle_fem.model.reduced.drive import LARGEST_STEP, STANDARD
 from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.resolved_jumps import least_jump, rule_of_jumps
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.standard_inputs import standard_inputs
@@ -147,6 +148,9 @@ def _state_space(
     outputs = {channel: "um" if channel in sensors else CELSIUS for channel in fast.channels}
     header = header_of(name, TR_BDF2, LARGEST_STEP, inputs, outputs, loads)
     header["notes"] += [*sources.notes, *effects.notes]
+    header["jumps"] = rule_of_jumps()
+    largest = [(item.name, item.default if item.high is None else item.high) for item in inputs]
+    arrays["least_jump"] = np.array([least_jump(*item) for item in largest])
     if coolant.scaling is not None:
         header[SCALED_FLOW] = [position[name] for name in ("coolant_flow", "coolant_inlet")]
         position[SCALED_FLOW] = -1

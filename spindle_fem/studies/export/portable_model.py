@@ -67,6 +67,8 @@ class PortableModel:
         self._solver = None
         if header["feedback_tables"]:
             self._prepare_feedback()
+        # Inputs and their rates at the end of the last step, and the time since the last jump.
+        self._last, self._since = None, 0.0
         self.state = self.arrays["uniform"] * header["initial_degC"]
 
     @classmethod
@@ -190,6 +192,7 @@ class PortableModel:
         Between readings the machine starts in the balance in which heat enters or leaves it only where
         it is read, and as the inputs say.
         """
+        self._last = None
         if not hasattr(temperature, "keys"):
             self.state = self.arrays["uniform"] * float(temperature)
             return
@@ -209,6 +212,7 @@ class PortableModel:
         values = self._usable(inputs)
         conduction, load, _, _ = self.matrices(values)
         self.state = self._balanced(conduction, load @ self.loads(values), values)
+        self._last, self._since = (values, np.zeros(len(values))), math.inf
 
     def _balanced(self, system, right, values):
         """State in which a system holds, what follows temperatures included."""
@@ -241,7 +245,8 @@ class PortableModel:
     def step(self, seconds, inputs, inputs_after=None):
         """Go on by some seconds, with inputs held, or going straight to those after.
 
-        Steps longer than the model's longest are divided; inputs beyond its range count as its end.
+        Steps longer than the model's longest are divided, those after the start and after jumps of inputs
+        into ones that begin short; inputs beyond its range count as its end.
 
         Returns
         -------
@@ -250,12 +255,39 @@ class PortableModel:
         """
         after = inputs if inputs_after is None else inputs_after
         begin, end = self._usable(inputs), self._usable(after)
-        number = max(1, math.ceil(seconds / self.header["longest_step_s"] - 1e-9))
         advance = self._exact if self.header["scheme"] == "exact" else self._tr_bdf2
-        for piece in range(number):
-            first, last = (begin + (end - begin) * (at / number) for at in (piece, piece + 1))
-            advance(seconds / number, first, last)
+        passed = 0.0
+        for length in self._lengths(seconds, begin, end):
+            first, last = (begin + (end - begin) * min(1.0, at / seconds) for at in (passed, passed + length))
+            advance(length, first, last)
+            passed += length
         return sorted({*self.outside(inputs), *self.outside(after)})
+
+    def _lengths(self, seconds, begin, end):
+        """Lengths of the steps into which one is divided, s."""
+        number = max(1, math.ceil(seconds / self.header["longest_step_s"] - 1e-9))
+        piece, jumps = seconds / number, self.header.get("jumps")
+        if jumps is None or piece == 0.0:
+            return [piece] * number
+        least, rate = self.arrays["least_jump"], (end - begin) / seconds
+        if self._last is None:
+            self._since = 0.0
+        else:
+            before, bent = np.abs(begin - self._last[0]), piece * np.abs(rate - self._last[1])
+            if (before > least).any() or (bent > jumps["bend"] * least).any():
+                self._since = 0.0
+        self._last = end, rate
+        parts = max(1, math.ceil((piece * np.abs(rate) / least).max() / jumps["most"]))
+        longest, found = max(jumps["shortest_s"], piece / parts), []
+        for _ in range(number):
+            left = piece
+            while left > 1e-9 * piece:
+                allowed = min(longest, max(jumps["first_s"], jumps["growth"] * self._since))
+                # no last one that is much shorter than the one before
+                length = left if left <= allowed * (1.0 + 1e-9) else min(allowed, 0.5 * left)
+                found.append(length)
+                left, self._since = left - length, self._since + length
+        return found
 
     def _exact(self, step, first, last):
         """Each mode by itself, for loads that are linear in time."""
