@@ -110,6 +110,7 @@ def test_the_exported_network_is_a_machine_that_reproduces_the_elements(result):
 def test_the_state_space_reproduces_it_too(result):
     folder, content, _ = result
     with np.load(folder / "state_space.npz") as space:
+        assert space["schema"] == "spindle-fem/network-state-space/1"
         speed = content["operating_point"]["speed_rpm"]
         k = int(np.argmin(np.abs(space["speed_rpm"] - speed)))
         a, b, c, d = (space[name][k] for name in "ABCD")

@@ -18,7 +18,8 @@ from spindle_fem.studies.crosscheck.flux_matched import MatchedNetwork
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
-STATE_SPACE_SCHEMA = "spindle-fem/state-space/1"
+# Not that of exported models, which hold other arrays under other names.
+STATE_SPACE_SCHEMA = "spindle-fem/network-state-space/1"
 RPM = np.pi / 30.0
 
 
