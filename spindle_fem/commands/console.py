@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,8 @@ from spindle_fem.results.run_log import LOGGER
 
 # Lines of one kind that are printed; files have them all.
 MOST_LINES = 12
+# Without a terminal, stages that begin later than this after the start are told [s].
+FIRST_LINE = 3.0
 
 
 def open_console() -> Console:
@@ -395,14 +398,19 @@ def print_transient(content: dict[str, Any], folder: Path) -> None:
 def stages(show: bool, shares: Mapping[str, float] | None = None) -> Iterator[Any]:
     """Stage names and the time since the start on the terminal while they run, and in the log.
 
+    Without a terminal, each stage that begins after the first seconds is a line of the error output.
+
     Parameters
     ----------
     shares : mapping of str to float
         Of the whole time, by stage: what has usually passed when it begins; time left follows from it.
     """
     console = Console(stderr=True)
-    if not show or Verbosity.quiet or Verbosity.verbose or not console.is_terminal:
+    if not show or Verbosity.quiet or Verbosity.verbose:
         yield LOGGER.info
+        return
+    if not console.is_terminal:
+        yield _stage_lines(Console(stderr=True, width=120, markup=False, highlight=False))
         return
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -421,6 +429,19 @@ def stages(show: bool, shares: Mapping[str, float] | None = None) -> Iterator[An
             shown.update(task, description=f"{stage} ...", **found)
 
         yield tell
+
+
+def _stage_lines(console: Console) -> Callable[[str], None]:
+    """Stages as lines with the time since now, from :data:`FIRST_LINE` on."""
+    began = time.monotonic()
+
+    def tell(stage: str) -> None:
+        LOGGER.info(stage)
+        passed = time.monotonic() - began
+        if passed >= FIRST_LINE:
+            console.print(f"after {passed:.0f} s: {stage} ...")
+
+    return tell
 
 
 @contextlib.contextmanager

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from spindle_fem.commands import console
 from spindle_fem.errors import BadInputError
 from spindle_fem.results.output_folder import output_folder
 from spindle_fem.results.run_log import LOG_FILE, LOGGER
@@ -43,8 +44,17 @@ def test_a_verbose_command_tells_its_stages_and_the_log_has_them(command, pump, 
         assert text in done.stderr
         assert text in log
     again = command(*pump)
-    assert "simulation" not in again.stderr
+    assert "INFO" not in again.stderr
     assert (tmp_path / "out" / LOG_FILE).read_text(encoding="utf-8").count("done after") == 2
+
+
+def test_without_a_terminal_stages_of_long_commands_are_lines(command, pump, monkeypatch):
+    monkeypatch.setattr(console, "FIRST_LINE", 0.0)
+    assert "s: simulation ...\n" in command(*pump).stderr
+    assert command(*pump, "--json").stderr == ""
+    assert command(*pump, "--quiet").stderr == ""
+    monkeypatch.setattr(console, "FIRST_LINE", 1e9)
+    assert command(*pump).stderr == ""
 
 
 def failing_run(folder):
