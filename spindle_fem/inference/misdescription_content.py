@@ -88,20 +88,19 @@ def _row(diagnosis: Diagnosis, fit: Fit, item: Misdescription) -> dict[str, Any]
 def _to_measure(
     diagnosis: Diagnosis, fit: Fit, directions: Sequence[Misdescription]
 ) -> dict[str, Any] | None:
-    """The direction without which the fit would become worst: what to measure.
+    """The direction that readings hold farthest off the definition, in widths of its posterior.
 
-    Were it found to be as the definition has it, the misfit would rise by the square of its value in standard
-    deviations of its posterior.
+    None where none lies more than one width off.
     """
     names = [c.name for c in fit.coordinates]
     best, most = None, 1.0
     for item in directions:
         row = names.index(item.coordinate)
-        rise = fit.position[row] ** 2 / fit.covariance[row, row]
-        if rise > most:
-            best, most = item, float(rise)
+        widths = abs(fit.position[row]) / np.sqrt(fit.covariance[row, row])
+        if widths > most:
+            best, most = item, float(widths)
     if best is None:
         return None
     row = _row(diagnosis, fit, best)
-    why = f"were it as the definition has it, the misfit would rise by {most:.0f}"
+    why = f"the readings hold it {most:.1f} standard deviations off the definition"
     return {"key": best.key, "name": best.name, "expected": row["value"], "unit": best.unit, "why": why}
