@@ -60,8 +60,8 @@ CAPTIONS = {
     "displacements": "Displacements as read, model before and after, and what each leaves, but for where "
     "the sensor was set; shaded: not fitted.",
     "residual_map": "Root mean square residual by channel and condition, before and after.",
-    "sets": "Probability of every set of effects that was fitted to the end. Misfit: root mean square of what "
-    "it leaves of the readings, in widths of their noise and slow error.",
+    "sets": "Probability of every set of effects that was fitted to the end. Misfit: root mean square of "
+    "what it leaves of the readings, in widths of their noise and slow error.",
     "findings": "Parameters of the findings, with 90 % intervals.",
     "parameters": "The machine's own uncertain parameters, prior against posterior.",
     "where": "How well heat that is missing at one place only would explain the readings.",
