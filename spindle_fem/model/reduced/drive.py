@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 # Walls of the channel whose mean differs by less share a film where films follow the wall, K; that many
 # classes more at most.
-WALL_BIN, MOST_WALLS = 0.1, 200
+WALL_BIN, MOST_WALLS = 0.02, 200
 LARGEST_STEP = 60.0
 MOST_STEP_SIZES = 200
 

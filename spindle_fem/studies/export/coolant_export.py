@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +41,11 @@ TOLERANCE, OF_FRICTION, OF_SCALED = 5e-5, 10.0, 2.0
 MOST_POINTS = 5000
 # Mean rises of the channel's wall above the inlet, K: where films are worked out, everywhere and about the
 # usual one, as a flow that turns turbulent bends within a kelvin; and points of the table.
-RISES, NEAR_USUAL, RISE_AXIS = (
+RISES, NEAR_USUAL, RISE_AXIS, CLOSE_RISES = (
     np.linspace(-15.0, 30.0, 10),
     np.arange(-6.0, 7.0),
     np.linspace(-15.0, 30.0, 46),
+    np.arange(-3.0, 3.5, 0.5),
 )
 # The wall changes the film only a little: fewer flows and directions suffice.
 WALL_TOLERANCE, WALL_LEFT_OUT = 2e-3, 3e-6
@@ -55,42 +57,70 @@ CHECKED, LARGEST_DEPARTURE = 15, 5e-4
 SCALED_FLOW, SCALE_POINTS = "scaled_flow", 121
 # After which no wall moves any more, and its steps, s.
 SETTLED, SETTLING_STEP = 3.0 * 86400.0, 3600.0
+# A colder inlet [K] and then a stop, each for some seconds, show how the profile of the wall changes; changes
+# of the mean that tell little of that [K].
+COLDER, CHANGED, SMALL_CHANGE = 2.0, 3600.0, 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class WallRise:
-    """Rise of the channel's wall above the inlet: a profile along the cells, scaled by its mean.
+    """Rise of the channel's wall above the inlet along its cells, by its mean.
 
     Attributes
     ----------
     profile : (n_cells,) ndarray
-        Of mean 1.
+        At the usual mean, of mean 1.
     usual : float, [K]
         Mean rise about which films are taken.
+    leaning : (n_cells,) ndarray
+        Change of the rise beside that in proportion to the mean, per kelvin of it; of mean 0.
+    least, most : float, [K]
+        Changes of the mean between which that holds; beyond, it stays.
     sense : (r,) ndarray
         Mean temperature of the wall from the fast model's unknowns.
     """
 
     profile: Array
     usual: float
+    leaning: Array
+    least: float
+    most: float
     sense: Array
 
     @classmethod
     def of(cls, fast: FastModel) -> WallRise:
-        """Rise after days at the definition's operating point."""
+        """Rise after days at the definition's operating point, and as inlet and then speed change."""
         point = OperatingPoint.of(fast.spec)
         inputs = standard_inputs(fast.spec)
-        values = np.array([[inputs[name] for name in STANDARD]] * 2)
         held = np.ones(len(STANDARD), dtype=bool)
-        times = np.array([0.0, SETTLED])
-        drive = make_drive(times, STANDARD, values, held, largest_step=SETTLING_STEP)
-        states, _ = TransientRun(fast, drive, {}, (), fast.own_terms(drive)).march(point.ambient_temperature)
-        area = fast.model.cell_area.ravel()
-        rise = fast.channel.walls(states[-1:])[0] - point.coolant_inlet_temperature
-        mean = float(area @ rise / area.sum())
-        even = abs(mean) <= LEAST_MEAN * np.abs(rise).max()
-        profile = np.ones(rise.size) if even else rise / mean
-        return cls(profile, mean, fast.model.cell_load.sum(axis=0) / area.sum())
+
+        def march(
+            changes: list[dict[str, float]], seconds: float, step: float, start: float | Array
+        ) -> Array:
+            values = [[{**inputs, **own}[name] for name in STANDARD] for own in (*changes, changes[-1])]
+            times = seconds * np.arange(len(values))
+            drive = make_drive(times, STANDARD, np.array(values), held, largest_step=step)
+            return TransientRun(fast, drive, {}, (), fast.own_terms(drive)).march(start)[0]
+
+        colder = {"coolant_inlet": point.coolant_inlet_temperature - COLDER}
+        settled = march([{}], SETTLED, SETTLING_STEP, point.ambient_temperature)[-1]
+        moved = march([colder, colder | {"speed": 0.0}], CHANGED, CHANGED / 12.0, settled)
+        inlet = point.coolant_inlet_temperature - COLDER * (np.arange(len(moved)) > 0)
+        area = fast.model.cell_area.ravel() / fast.model.cell_area.sum()
+        rises = fast.channel.walls(moved) - inlet[:, None]
+        means = rises @ area
+        mean = float(means[0])
+        sense = fast.model.cell_load.sum(axis=0) / fast.model.cell_area.sum()
+        if abs(mean) <= LEAST_MEAN * np.abs(rises[0]).max():
+            return cls(np.ones(area.size), mean, np.zeros(area.size), 0.0, 0.0, sense)
+        profile, change = rises[0] / mean, means - mean
+        beside = rises - np.outer(means, profile)
+        leaning = change @ beside / (change @ change + change.size * SMALL_CHANGE**2)
+        return cls(profile, mean, leaning, float(change.min()), float(change.max()), sense)
+
+    def along(self, mean: float) -> Array:
+        """Rise of each cell at a mean rise, (n_cells,) K."""
+        return mean * self.profile + np.clip(mean - self.usual, self.least, self.most) * self.leaning
 
     def means(self) -> Array:
         """Mean rises at which films are worked out, K."""
@@ -222,7 +252,7 @@ class CoolantOperators:
         mean = self.wall.usual if rise is None else rise
         own = {name: getattr(point, name) for name in OperatingPoint.__slots__}
         coolant = coolant_by_name(self.fast.spec.coolant.fluid)
-        wall = point.coolant_inlet_temperature + mean * self.wall.profile
+        wall = point.coolant_inlet_temperature + self.wall.along(mean)
         known = coolant.lowest_temperature, coolant.highest_temperature
         return WarmedPoint(**own, channel_wall=np.clip(wall, *known))
 
@@ -313,7 +343,7 @@ def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> Feedb
     if not len(basis):
         return None
     coarse = weights.reshape(rises.size, *(axis.size for axis in axes), -1)
-    rise_axis = np.union1d(RISE_AXIS, rises)
+    rise_axis = np.union1d(RISE_AXIS, [*rises, *(wall.usual + CLOSE_RISES)])
     values = PchipInterpolator(rises, coarse)(rise_axis)
     parts = operator_parts(fast, basis * scale)
     loads = [fast.load_names.index(name) for name in ("coolant_inlet", "coolant_friction")]
