@@ -216,8 +216,9 @@ class BearingSet(SpecModel):
     preload: PreloadOrClass = 0.0
     """Force through the set, which sets of ball bearings must give; bearings in tandem share it. `light`,
     `medium` or `heavy` of bearings that ship. Rollers have `radial_clearance` instead."""
-    preload_kind: Literal["rigid", "spring"] = "rigid"
-    """Held by a distance (rings, locknut) or by a force (springs). Springs may load a set whose bearings all
+    preload_kind: Literal["rigid", "elastic", "spring"] = "rigid"
+    """Held by a distance (rings, locknut), by a distance between shaft, housing and spacers that give way
+    along the axis, or by a force (springs). Springs may load a set whose bearings all
     face one way, as two at the rear in tandem: each carries its share whatever the thrust, and the set
     that carries the thrust holds against them."""
     fit: Fit | None = None
@@ -259,13 +260,13 @@ class BearingSet(SpecModel):
 
     @model_validator(mode="after")
     def _check(self) -> BearingSet:
-        if self.preload_kind == "rigid" and self.preload > 0.0 and self.faces_one_way:
+        if self.preload_kind != "spring" and self.preload > 0.0 and self.faces_one_way:
             raise_faults(
                 [
                     Fault(
                         "preload",
-                        f"{self.preload:g} N is rigid, but every bearing of the set takes_thrust "
-                        f'"{self.bearing[0].takes_thrust}".',
+                        f"{self.preload:g} N is {self.preload_kind}, but every bearing of the set "
+                        f'takes_thrust "{self.bearing[0].takes_thrust}".',
                         'Allowed: bearings of both directions, preload_kind = "spring", or no preload.',
                     )
                 ]

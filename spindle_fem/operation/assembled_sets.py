@@ -10,6 +10,7 @@ from spindle_fem.definition.bearing_types import BallBearingType, Cage
 from spindle_fem.definition.machine_spec import BearingSet, MachineSpec, RollerBearingType
 from spindle_fem.definition.solid_tables import Material, SetBearing
 from spindle_fem.errors import SpecError
+from spindle_fem.model.elastic.preload_loop import loop_stiffness
 from spindle_fem.physics.bearings import mounting
 from spindle_fem.physics.bearings.bearing_geometry import STEEL_EXPANSION, BearingGeometry
 from spindle_fem.physics.bearings.cage_guidance import CageGuidance
@@ -52,7 +53,8 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet |
         ),
         # Springs on bearings that all face one way are a load on them.
         preload=0.0 if group.spring_force else group.preload,
-        preload_kind=group.preload_kind,
+        preload_kind="spring" if group.preload_kind == "spring" else "rigid",
+        loop_stiffness=_loop_stiffness(spec, group),
         shaft_expansion=_seat_expansion(spec, group, "inner"),
         housing_expansion=_seat_expansion(spec, group, "outer"),
         shaft_bore_diameter=_shaft_bore(spec, group),
@@ -62,6 +64,14 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet |
     if group.fit is not None:
         _require_holding(group, mounted)
     return mounted
+
+
+def _loop_stiffness(spec: MachineSpec, group: BearingSet) -> float | None:
+    """Of what lies between the two sides of a set, N/m; None where nothing gives way."""
+    if group.preload_kind != "elastic":
+        return None
+    found = loop_stiffness(spec, group)
+    return found if math.isfinite(found) else None
 
 
 def ball_geometry(spec: MachineSpec, kind: BallBearingType) -> BearingGeometry:

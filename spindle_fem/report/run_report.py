@@ -126,7 +126,7 @@ def render_run_report(
         shown = [
             *_drawn(illustrations, "deformed_machine"),
             tables.growth_table(summary),
-            *(table for table in (nose, read) if table.rows),
+            *(table for table in (tables.spacer_table(summary), nose, read) if table.rows),
             *_equilibrium(summary),
         ]
         sections.append(Section("growth", "Growth and fits", shown))

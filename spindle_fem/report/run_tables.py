@@ -270,6 +270,16 @@ def growth_table(summary: Mapping[str, Any]) -> Table:
     return Table(columns, rows_of(rows), caption)
 
 
+def spacer_table(summary: Mapping[str, Any]) -> Table:
+    """How much longer the spacers have become."""
+    entries = {
+        readable(name): item["length_um"] for name, item in summary["growth"].get("spacers", {}).items()
+    }
+    fields = (words("spacer", itemgetter(0)), fixed("longer / µm", itemgetter(1), 2))
+    caption = "Growth of the spacers along the axis since assembly, by temperature alone."
+    return table_of(fields, entries.items(), caption)
+
+
 def displacement_table(summary: Mapping[str, Any]) -> Table:
     """Readings of the displacement sensors."""
     fields = (words("sensor", itemgetter(0)), fixed("displacement / µm", itemgetter(1), 2))

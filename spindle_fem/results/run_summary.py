@@ -207,6 +207,7 @@ def _growth(growth: Growth) -> dict[str, Any]:
             "nose_tilt_across_urad": 1e6 * tilt_across,
             "raceways": raceways,
             "seats": seats,
+            "spacers": {name: {"length_um": 1e6 * value} for name, value in growth.spacers.items()},
         },
         "fits": fits,
     }

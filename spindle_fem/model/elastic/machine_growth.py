@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -23,6 +23,7 @@ from spindle_fem.model.elastic.elastic_body import ElasticBody, Face
 from spindle_fem.model.elastic.growth_outputs import AXIAL, RADIAL, SIDEWAYS, BodyOutputs
 from spindle_fem.model.elastic.machine_bodies import MachineBodies, machine_bodies
 from spindle_fem.model.elastic.meridian_field import MeridianField
+from spindle_fem.model.elastic.preload_loop import spacer_body, spacer_ends
 from spindle_fem.model.elastic.ring_seats import RingSeats
 from spindle_fem.physics.bearings.mounting import ROOM_TEMPERATURE
 
@@ -66,12 +67,15 @@ class Growth:
         Across is where θ = 90°: to the right of who looks along the axis from the nose.
     nose_tilt : (up, across) or None, [rad]
         Turn of the axis: its shift for each metre towards the drive end.
+    spacers : mapping of str to float, [m]
+        How much longer each spacer has become, free of the force of the locknut.
     """
 
     seats: Mapping[tuple[str, Side], SeatState]
     nose_axial: float | None
     nose_radial: tuple[float, float] | None = None
     nose_tilt: tuple[float, float] | None = None
+    spacers: Mapping[str, float] = field(default_factory=dict)
 
 
 # Motions of the nose, m and rad.
@@ -153,6 +157,7 @@ class GrowthModel:
         #: Outputs of shaft and housing beside their seats.
         self.carriers = {name: found for name in self.seating.carriers if (found := self._carrier(name))}
         self.bending = self._bending()
+        self.spacer_rows = self._spacers(mesh, order)
         sets = spec.bearing_set
         groups = {bearing.name: group for group, bearing in spec.bearings}
         self._assembled_at = np.array([groups[name].assembly_temperature for name in self.bearings])
@@ -170,6 +175,18 @@ class GrowthModel:
         self.thermal_rows = self.seating.thermal_rows(
             self.seat_rows, ring_rows.reshape(len(self.rings), 2, self._size)
         )
+
+    def _spacers(self, mesh: TaggedMesh, order: int) -> dict[str, Array]:
+        """Length of every spacer by each temperature, (n_unknowns,) m/K."""
+        layout, found = Layout(self.spec, set()), {}
+        for part in self.spec.part:
+            if layout.is_spacer(part) and part.name in mesh.part_names:
+                body = spacer_body(self.spec, part)
+                front, rear = (body.mean_shift(face, AXIAL) for face in spacer_ends(part))
+                outputs = BodyOutputs.of(body, {"length": rear - front})
+                temperatures = MeridianField(mesh, order, (part.name,), body.section)
+                found[part.name] = temperatures.rows(outputs.by_temperature())[0]
+        return found
 
     def _rows(self, outputs: BodyOutputs) -> Array:
         return self.fields[outputs.body.name].rows(outputs.by_temperature())
@@ -269,8 +286,8 @@ class GrowthModel:
 
     def _bent_rows(self, outputs: BodyOutputs) -> Array:
         """Rows (k, 2, n_unknowns) of outputs of the bent housing, up and across each."""
-        field, shifts = self.fields[outputs.body.name], outputs.by_temperature()
-        return np.stack([field.rows(shifts, around) for around in ("up", "across")], axis=1)
+        temperatures, shifts = self.fields[outputs.body.name], outputs.by_temperature()
+        return np.stack([temperatures.rows(shifts, around) for around in ("up", "across")], axis=1)
 
     def _bending(self) -> Array:
         """Rows (4, n_unknowns): nose up, across; tilt up, across. Empty if they are not defined."""
@@ -333,7 +350,9 @@ class GrowthModel:
             )
         bent = self.bending @ (temperature - self.assembly_temperature)
         radial, tilt = (tuple(pair) for pair in bent.reshape(2, 2).tolist()) if len(bent) else (None, None)
-        return Growth(found, self._nose(temperature), radial, tilt)
+        rise = temperature - self.assembly_temperature
+        spacers = {name: float(row @ rise) for name, row in self.spacer_rows.items()}
+        return Growth(found, self._nose(temperature), radial, tilt, spacers)
 
     def pressures(self, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]) -> Array:
         """Pressures on the seat and on the raceway of every ring, (2, n) Pa; arguments as of :meth:`at`."""

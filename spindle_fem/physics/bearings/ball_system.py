@@ -51,6 +51,8 @@ class BallSystem:
     rings : RingCompliance, CoupledRings or None
         Displacements that are raceway growths, held by rings that give way;
         None: rigid rings.
+    stiffness : (m,) ndarray or None, [N/m]
+        Of linear springs that hold displacements; None: none do.
     """
 
     ball_diameter: FloatArray
@@ -67,6 +69,7 @@ class BallSystem:
     polynomials: FloatArray
     smoothing: float = 0.0
     rings: RingCompliance | CoupledRings | None = None
+    stiffness: FloatArray | None = None
 
     @property
     def number(self) -> int:
@@ -383,6 +386,8 @@ def _ring_residual(
     """Forces on the rings that are not in balance, and how those of rings that give way fall."""
     weighted = system.weight[:, None] * evaluation.ring_force
     residual = system.axial_map.T @ weighted[:, 0] + system.radial_map.T @ weighted[:, 1] - load
+    if system.stiffness is not None:
+        residual += system.stiffness * displacement
     if system.rings is None:
         return residual, None
     force, fall = system.rings.force(displacement)
@@ -421,4 +426,6 @@ def _tangent(
     if system.rings is not None:
         columns = system.rings.columns
         tangent[np.ix_(columns, columns)] += fall
+    if system.stiffness is not None:
+        tangent[np.diag_indices_from(tangent)] += system.stiffness
     return tangent, solved_residual, solved_distance

@@ -65,6 +65,9 @@ class BearingSet:
     preload_kind : {"rigid", "spring"}
         Rigid (locknut) keeps the displacement of the rings; a spring on the
         outer rings of the bearings with orientation -1 keeps the force.
+    loop_stiffness : float or None, [N/m]
+        Of shaft, housing and spacers between the two sides of a rigid set: how they give way to its force
+        beyond that of assembly. None: not at all.
     shaft_expansion, housing_expansion : float, [1/K]
     shaft_bore_diameter : float or None, [m]
         Of a hollow shaft; with it the inner ring grows by rotation. None: no growth.
@@ -94,6 +97,7 @@ class BearingSet:
     ball_roughness: float = 0.01e-6
     roughness: SurfaceRoughness | None = None
     seats: SeatBodies | None = None
+    loop_stiffness: float | None = None
     recent: dict[tuple, Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -110,6 +114,8 @@ class BearingSet:
         for key in ("raceway_roughness", "ball_roughness"):
             if not getattr(self, key) > 0.0:
                 raise SpecError(key, f"it is {getattr(self, key):g} m.", "It must be above 0.")
+        if self.loop_stiffness is not None and not self.loop_stiffness > 0.0:
+            raise SpecError("loop_stiffness", f"it is {self.loop_stiffness:g} N/m.", "It must be above 0.")
 
     @property
     def has_counter_bearings(self) -> bool:
@@ -126,7 +132,7 @@ class BearingSet:
     def with_rigid_rings(self) -> BearingSet:
         """The set with rings that keep their size: the contact angle is that of the mounted bearing."""
         bearings = tuple(replace(bearing, fits=None) for bearing in self.bearings)
-        return replace(self, bearings=bearings, seats=None, recent=None)
+        return replace(self, bearings=bearings, seats=None, loop_stiffness=None, recent=None)
 
     def assembly_approaches(self) -> FloatArray:
         """Axial approach of each bearing after assembly, (n_bearings,), m.

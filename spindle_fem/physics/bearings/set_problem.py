@@ -37,7 +37,8 @@ class SetProblem:
     """Ball rows of every bearing, joined, with the load on the displacements.
 
     ``ball_load`` is the size of the largest ball load at rest, N; ``spring``
-    adds the floating outer rings as the last displacement; ``ring_growth`` is
+    adds the floating outer rings as the last displacement, as does a rigid set
+    whose loop gives way, which a spring then holds; ``ring_growth`` is
     where the raceways of bearings with fits are looked for, m.
     """
 
@@ -98,7 +99,8 @@ def build_problem(
     load = np.array([external.thrust, external.radial, 0.0, external.moment, 0.0])[columns]
     load = np.append(load, np.zeros(len(growths)))
     spring = bearing_set.preload_kind == "spring" and bearing_set.has_counter_bearings
-    if spring:
+    gives = not spring and bearing_set.loop_stiffness is not None and bearing_set.has_counter_bearings
+    if spring or gives:
         sides = np.repeat([b.orientation for b in bearing_set.bearings], [len(row["weight"]) for row in rows])
         floating = (sides < 0).astype(float)[:, None]
         system = replace(
@@ -106,6 +108,11 @@ def build_problem(
             radial_map=np.hstack([system.radial_map, np.zeros_like(floating)]),
         )  # fmt: skip
         load = np.append(load, bearing_set.preload)
+    if gives:
+        # What is beyond the preload of assembly presses the loop together.
+        held = np.zeros(len(load))
+        held[-1] = bearing_set.loop_stiffness
+        system = replace(system, stiffness=held)
     return SetProblem(
         bearing_set, rows, system, load, spring, _ball_load(bearing_set, external), np.array(growths)
     )
@@ -197,7 +204,7 @@ def side_by_side(problems: Sequence[SetProblem]) -> BallSystem:
     arrays = {
         name: np.concatenate([getattr(system, name) for system in systems])
         for name in BallSystem.__slots__
-        if name not in ("axial_map", "radial_map", "smoothing", "rings")
+        if name not in ("axial_map", "radial_map", "smoothing", "rings", "stiffness")
     }
     maps = {
         name: scipy.linalg.block_diag(*(getattr(system, name) for system in systems))
@@ -207,7 +214,15 @@ def side_by_side(problems: Sequence[SetProblem]) -> BallSystem:
     seated = [(first, s.rings) for first, s in zip(firsts, systems, strict=True) if s.rings is not None]
     if seated:
         rings = type(seated[0][1]).joined(seated)
-    return BallSystem(**arrays, **maps, rings=rings)
+    held = None
+    if any(system.stiffness is not None for system in systems):
+        held = np.concatenate(
+            [
+                np.zeros(w) if s.stiffness is None else s.stiffness
+                for w, s in zip(widths, systems, strict=True)
+            ]
+        )
+    return BallSystem(**arrays, **maps, rings=rings, stiffness=held)
 
 
 def start_displacement(problem: SetProblem, where: str) -> FloatArray:

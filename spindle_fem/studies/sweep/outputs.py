@@ -131,6 +131,8 @@ def _paths(spec: MachineSpec) -> Iterator[str]:
         for name in names:
             yield from (f"growth.raceways.{name}.{ring}_um" for ring in ("inner", "outer"))
             yield from (f"growth.seats.{name}.{side}_um" for side in ("shaft", "housing"))
+        spacers = (part.name for part in spec.part if Layout(spec, set()).is_spacer(part))
+        yield from (f"growth.spacers.{name}.length_um" for name in spacers)
     yield from (f"displacements.{sensor.name}" for sensor in spec.displacement_sensor)
     for group in spec.bearing_set:
         if group.preload > 0.0 and spec.heat.model != "table":
