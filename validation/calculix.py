@@ -1,10 +1,10 @@
-"""Growth of bodies by CalculiX on the same tetrahedra as :mod:`validation.solid_growth`, and beside the package.
+"""Growth of bodies by CalculiX, on the same tetrahedra as by scikit-fem, and beside the package.
 
     python -m validation.calculix [BODY ...]
 
-The reference spindle as it runs at 3000 rpm, coarse mesh; bodies ``F1.inner_ring`` and ``shaft`` unless others are
-named. Needs ``ccx`` (CalculiX CrunchiX; Debian: ``apt install calculix-ccx``). Quadratic tetrahedra (C3D10),
-whose thermal strain CalculiX interpolates from their corners.
+The reference spindle as it runs at 3000 rpm, coarse mesh; bodies ``F1.inner_ring`` and ``shaft`` unless
+others are named. Needs ``ccx`` (CalculiX CrunchiX; Debian: ``apt install calculix-ccx``). Quadratic
+tetrahedra (C3D10), whose thermal strain CalculiX interpolates from their corners.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def seat_growths(solid: Solid, machine, name: str, field: Array) -> dict[str, tu
 
 
 def main(names: list[str]) -> None:
-    """Print how far both are apart, over the largest shift, and seats of shaft or housing beside the package."""
+    """Print how far both are apart, over the largest shift, and seats beside the package."""
     machine = prepare_machine(load_machine("wu_tan_2016", ["mesh.preset=coarse", "mesh.order=1"]))
     field = solve_prepared(machine, find_fold=False).temperature[: machine.mesh.n_corners]
     for name in names or ["F1.inner_ring", "shaft"]:
