@@ -17,7 +17,7 @@ from spindle_fem.report import table_rows
 from spindle_fem.report.figure_style import new_figure
 from spindle_fem.report.interactive_view import SURFACE_GROUP, display_surface, viewer_payload
 from spindle_fem.report.run_outputs import OutputHelpers, write_outputs
-from spindle_fem.report.run_report import in_order, rebuild_report, render_run_report
+from spindle_fem.report.run_report import _equilibrium, in_order, rebuild_report, render_run_report
 from spindle_fem.results.dataset import build_dataset, read_dataset
 from spindle_fem.results.output_folder import output_folder
 from spindle_fem.results.run_log import LOG_FILE
@@ -307,3 +307,25 @@ def test_broken_summary_is_refused(tmp_path):
     (tmp_path / "summary.json").write_text('{"schema": "spindle-fem/summary/9"}')
     with pytest.raises(BadInputError, match="summary/9"):
         rebuild_report(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("fold", "searched", "said"),
+    [
+        (4713.0, None, "Above 4713 rpm heat and preload feed each other without end: no steady state exists"),
+        (None, 4500.0, "Followed up to 4500 rpm, heat and preload do not run away"),
+        (None, None, "expansion is followed."),
+    ],
+)
+def test_the_end_of_steady_states_is_said(fold, searched, said):
+    found = {
+        "preload_ratio": {"F1": 2.0, "F2": 3.0},
+        "followed": True,
+        "fold_speed_rpm": fold,
+        "searched_to_rpm": searched,
+        "limits": [],
+    }
+    (text,) = _equilibrium({"equilibrium": found})
+    assert text.text.startswith("The preload of F2 is 3.00 times that of assembly")
+    assert said in text.text
+    assert ("rpm" in text.text) == (said != "expansion is followed.")
