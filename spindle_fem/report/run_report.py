@@ -162,13 +162,13 @@ def _equilibrium(summary: Mapping[str, Any]) -> list[Any]:
     if found["fold_speed_rpm"] is not None:
         said += (
             f" Above {found['fold_speed_rpm']:.0f} rpm heat and preload feed each other without end: no "
-            "steady state exists there. Films, oil and joints are those of this run, so that the speed is found "
-            "a little low."
+            "steady state exists there. Films, oil and joints are those of this run, so that the speed is "
+            "found a little low."
         )
     elif found["searched_to_rpm"] is not None:
         said += (
-            f" Followed up to {found['searched_to_rpm']:.0f} rpm, heat and preload do not run away: there is a "
-            "steady state at every speed from here to there."
+            f" Followed up to {found['searched_to_rpm']:.0f} rpm, heat and preload do not run away: there is "
+            "a steady state at every speed from here to there."
         )
     return [Text(said), *([Bullets(found["limits"])] if found["limits"] else [])]
 
