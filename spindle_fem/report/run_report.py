@@ -162,7 +162,7 @@ def _equilibrium(summary: Mapping[str, Any]) -> list[Any]:
     if found["fold_speed_rpm"] is not None:
         said += (
             f" Above {found['fold_speed_rpm']:.0f} rpm heat and preload feed each other without end: no "
-            "steady state exists there. Films, oil and joints are those of this run, so that the speed is "
+            "steady state exists there. Films and joints are those of this run, so that the speed is "
             "found a little low."
         )
     elif found["searched_to_rpm"] is not None:
