@@ -130,8 +130,8 @@ def _steady_scene(spec: MachineSpec, solid: Solid, temperature: Array, growth: A
     if shift is None:
         return scene
     note = (
-        "Growth is the mean round the axis against the back of the flange, bending left out; spacers and "
-        "covers move with the nearest body, balls and probes stay where they are drawn."
+        "Growth is the mean round the axis against the back of the flange, bending left out; covers move "
+        "with the housing, balls and probes stay where they are drawn."
     )
     return replace(scene, notes=(note,))
 

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.machine.view.part_roles import Layout
-from spindle_fem.model.elastic.elastic_body import ElasticBody
+from spindle_fem.model.elastic.elastic_body import ElasticBody, Face
 from spindle_fem.model.elastic.growth_outputs import AXIAL
-from spindle_fem.model.elastic.machine_growth import GrowthModel, flange_back
+from spindle_fem.model.elastic.machine_growth import GrowthModel, Spacer, flange_back
+from spindle_fem.model.elastic.preload_loop import TOUCHING, spacer_ends
 
 Array = NDArray[np.float64]
 
@@ -76,7 +77,27 @@ def deformed_shapes(
         under = carrier.mean_shift(ring.seat.face, AXIAL) @ found[ring.seat.carrier]
         own = body.mean_shift(ring.seat.face, AXIAL)
         found[ring.seat.ring] = _moved(body, shift, float(under - own @ shift))
-    return {name: _shape(model.bodies.bodies[name], shift) for name, shift in found.items()}
+    shapes = {name: _shape(model.bodies.bodies[name], shift) for name, shift in found.items()}
+    return shapes | {
+        name: _spacer_shape(model, spacer, temperature, found) for name, spacer in model.spacers.items()
+    }
+
+
+def _spacer_shape(
+    model: GrowthModel, spacer: Spacer, temperature: Array, moved: Mapping[str, Array]
+) -> BodyShape:
+    """A spacer at its temperatures, free, in the middle between the rings that it touches."""
+    body, apart = spacer.body, []
+    rise = spacer.temperatures.corner_values(temperature - model.assembly_temperature)
+    shift = body.solve(body.expansion_load() @ rise)
+    for ring in model.rings:
+        for end in spacer_ends(spacer.part):
+            touches = min(abs(end.z[0] - z) for z in ring.seat.face.z) < TOUCHING
+            if touches and ring.seat.is_inner is spacer.part.rotating:
+                radii = tuple(sorted((ring.seat.face.r[0], ring.seat.raceway.r[0])))
+                side = ring.outputs.body.mean_shift(Face(end.z, radii), AXIAL)
+                apart.append(side @ moved[ring.seat.ring] - body.mean_shift(end, AXIAL) @ shift)
+    return _shape(body, _moved(body, shift, float(np.mean(apart)) if apart else 0.0))
 
 
 def _thermal(model: GrowthModel, name: str, temperature: Array) -> Array:

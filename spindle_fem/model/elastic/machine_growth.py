@@ -7,15 +7,15 @@ temperatures and one small contact problem over all seats.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.machine_spec import BearingSet, MachineSpec, SetBearing
+from spindle_fem.definition.machine_spec import BearingSet, MachineSpec, Part, SetBearing
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.elastic.displacement_sensors import SensorSight, sensor_sights
@@ -76,6 +76,15 @@ class Growth:
     nose_radial: tuple[float, float] | None = None
     nose_tilt: tuple[float, float] | None = None
     spacers: Mapping[str, float] = field(default_factory=dict)
+
+
+class Spacer(NamedTuple):
+    """A ring between two bearings, the fit of its temperatures, and its length by each of them [m/K]."""
+
+    part: Part
+    body: ElasticBody
+    temperatures: MeridianField
+    length: Array
 
 
 # Motions of the nose, m and rad.
@@ -157,7 +166,8 @@ class GrowthModel:
         #: Outputs of shaft and housing beside their seats.
         self.carriers = {name: found for name in self.seating.carriers if (found := self._carrier(name))}
         self.bending = self._bending()
-        self.spacer_rows = self._spacers(mesh, order)
+        #: Every spacer and the field of its temperatures.
+        self.spacers = dict(self._spacers(mesh, order))
         sets = spec.bearing_set
         groups = {bearing.name: group for group, bearing in spec.bearings}
         self._assembled_at = np.array([groups[name].assembly_temperature for name in self.bearings])
@@ -176,17 +186,16 @@ class GrowthModel:
             self.seat_rows, ring_rows.reshape(len(self.rings), 2, self._size)
         )
 
-    def _spacers(self, mesh: TaggedMesh, order: int) -> dict[str, Array]:
-        """Length of every spacer by each temperature, (n_unknowns,) m/K."""
-        layout, found = Layout(self.spec, set()), {}
+    def _spacers(self, mesh: TaggedMesh, order: int) -> Iterator[tuple[str, Spacer]]:
+        layout = Layout(self.spec, set())
         for part in self.spec.part:
             if layout.is_spacer(part) and part.name in mesh.part_names:
                 body = spacer_body(self.spec, part)
                 front, rear = (body.mean_shift(face, AXIAL) for face in spacer_ends(part))
                 outputs = BodyOutputs.of(body, {"length": rear - front})
                 temperatures = MeridianField(mesh, order, (part.name,), body.section)
-                found[part.name] = temperatures.rows(outputs.by_temperature())[0]
-        return found
+                length = temperatures.rows(outputs.by_temperature())[0]
+                yield part.name, Spacer(part, body, temperatures, length)
 
     def _rows(self, outputs: BodyOutputs) -> Array:
         return self.fields[outputs.body.name].rows(outputs.by_temperature())
@@ -351,7 +360,7 @@ class GrowthModel:
         bent = self.bending @ (temperature - self.assembly_temperature)
         radial, tilt = (tuple(pair) for pair in bent.reshape(2, 2).tolist()) if len(bent) else (None, None)
         rise = temperature - self.assembly_temperature
-        spacers = {name: float(row @ rise) for name, row in self.spacer_rows.items()}
+        spacers = {name: float(spacer.length @ rise) for name, spacer in self.spacers.items()}
         return Growth(found, self._nose(temperature), radial, tilt, spacers)
 
     def pressures(self, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]) -> Array:

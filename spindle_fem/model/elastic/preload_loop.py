@@ -31,7 +31,7 @@ from spindle_fem.model.elastic.meridian_mesh import MeridianMesh
 
 Array = NDArray[np.float64]
 # Ends of rings and spacers that touch differ by less than this, m.
-_TOUCHING = 1.0e-6
+TOUCHING = 1.0e-6
 
 
 def loop_stiffness(spec: MachineSpec, group: BearingSet, bodies: MachineBodies | None = None) -> float:
@@ -112,7 +112,7 @@ def _stack_give(
     for index, share in enumerate(through):
         gap = seats[index].face.z[1], seats[index + 1].face.z[0]
         between = 0.0
-        if gap[1] - gap[0] > _TOUCHING:
+        if gap[1] - gap[0] > TOUCHING:
             spacer = _spacer(spec, gap, rotating=seats[0].is_inner)
             if spacer is None:
                 return None
@@ -126,7 +126,7 @@ def _spacer(spec: MachineSpec, gap: tuple[float, float], *, rotating: bool) -> P
     layout = Layout(spec, set())
     for part in spec.part:
         ends = [z for segment in part.segment for z in segment.z]
-        fills = abs(min(ends) - gap[0]) < _TOUCHING and abs(max(ends) - gap[1]) < _TOUCHING
+        fills = abs(min(ends) - gap[0]) < TOUCHING and abs(max(ends) - gap[1]) < TOUCHING
         if fills and part.rotating is rotating and layout.is_spacer(part):
             return part
     return None
