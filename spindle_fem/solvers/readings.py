@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from spindle_fem.model.elastic.machine_growth import Motions
+from spindle_fem.model.elastic.machine_growth import GrowthModel, Motions
 from spindle_fem.model.mesh.evaluate import mean_matrix, probe_matrix
 from spindle_fem.operation.circuits import CircuitMarch, stream_answer, wall_cells
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -65,7 +65,11 @@ class ReadingRows:
         if spec.circuits:
             walls = [name for film in spec.circuits for name in film.surface]
             blocks.append(_widened(mean_matrix(operators, walls), width))
-        motions = None if machine.growth is None else machine.growth.motions
+        growth = machine.growth
+        if growth is None and spec.displacement_sensor:
+            # Sensors see growth whether or not preload follows it.
+            growth = GrowthModel(spec, machine.mesh, operators.order)
+        motions = None if growth is None else growth.motions
         if motions is not None:
             blocks.append(_widened(sparse.csr_array(motions.rows), width))
         if machine.builder.cells is not None:
