@@ -10,7 +10,6 @@ from spindle_fem.definition.bearing_types import BallBearingType, Cage
 from spindle_fem.definition.machine_spec import BearingSet, MachineSpec, RollerBearingType
 from spindle_fem.definition.solid_tables import Material, SetBearing
 from spindle_fem.errors import SpecError
-from spindle_fem.model.elastic.preload_loop import loop_stiffness
 from spindle_fem.physics.bearings import mounting
 from spindle_fem.physics.bearings.bearing_geometry import STEEL_EXPANSION, BearingGeometry
 from spindle_fem.physics.bearings.cage_guidance import CageGuidance
@@ -70,6 +69,9 @@ def _loop_stiffness(spec: MachineSpec, group: BearingSet) -> float | None:
     """Of what lies between the two sides of a set, N/m; None where nothing gives way."""
     if group.preload_kind != "elastic":
         return None
+    # Checks of definitions do without finite elements.
+    from spindle_fem.model.elastic.preload_loop import loop_stiffness
+
     found = loop_stiffness(spec, group)
     return found if math.isfinite(found) else None
 
