@@ -159,6 +159,8 @@ def conditions_of(
     if not is_network_machine(read_definition(find_machine(machine))):
         spec = load_machine(machine, overrides)
         known = standard_inputs(spec)
+        if spec.coolant is None:
+            known = {name: value for name, value in known.items() if not name.startswith("coolant")}
         _require_known(given, known)
         for name, (_, unit) in given.items():
             if unit != UNITS[name]:

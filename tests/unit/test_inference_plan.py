@@ -7,7 +7,7 @@ import pytest
 
 from spindle_fem.commands.plan_command import plan, planned_measurement
 from spindle_fem.definition.load import load_machine
-from spindle_fem.errors import BadInputError
+from spindle_fem.errors import BadInputError, SpecError
 from spindle_fem.inference import measurement_plan, misdescription_columns, opened_machine
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.heldout import heldout_stamps
@@ -228,3 +228,13 @@ def test_bad_input_is_refused_with_what_is_allowed(machine, tmp_path, options, w
         plan(machine(), tmp_path / "out", **asked)
     assert caught.value.exit_status == 2
     assert words in str(caught.value)
+
+
+def test_a_test_of_a_machine_without_a_channel_has_no_coolant() -> None:
+    assert set(conditions_of("groove_spindle", (), {}, recorded=False).usual) == {
+        "speed",
+        "thrust",
+        "ambient",
+    }
+    with pytest.raises(SpecError, match="coolant_inlet"):
+        conditions_of("groove_spindle", (), {"coolant_inlet": (293.15, "kelvin")}, recorded=False)
