@@ -48,11 +48,13 @@ def no_equilibrium(name: str, point: OperatingPoint, reason: str) -> NoSteadySta
 def beyond_the_branch(error: NoSteadyStateError, branch: Branch) -> NoSteadyStateError:
     """The error of a runaway, with the speed at which a branch of equilibria over the speed ends."""
     rpm = branch.limit * 30.0 / np.pi
-    what = (
-        f"Heat and preload feed each other: equilibria end in a fold at {rpm:.0f} rpm."
-        if branch.end == "fold"
-        else f"A thermal equilibrium exists up to about {rpm:.0f} rpm: {branch.reason}"
-    )
+    if branch.end == "fold":
+        # What a search beyond the fold ends at is no cause: it comes last.
+        head, _, reached = error.what.partition(": ")
+        what = f"{head}: heat and preload feed each other, equilibria end in a fold at {rpm:.0f} rpm."
+        advice = f"{error.how_to_fix} (Heated beyond the fold it ends at: {reached.rstrip('.')}.)"
+        return NoSteadyStateError(error.where, what, advice if reached else error.how_to_fix)
+    what = f"A thermal equilibrium exists up to about {rpm:.0f} rpm: {branch.reason}"
     return NoSteadyStateError(error.where, error.what, f"{what} {error.how_to_fix}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_o
 from spindle_fem.operation.friction_map import film_temperature
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.machine_network_steady import network_heat_model, solve_machine_network
+from spindle_fem.solvers.preload_runaway import beyond_the_branch, no_equilibrium
 from tests.support.near_rings import NEAR_RINGS
 
 
@@ -137,3 +139,22 @@ def test_searches_from_the_last_equilibrium_find_what_those_from_rest_find(netwo
     for name, heat in expected.items():
         assert found[name].total == pytest.approx(heat.total, rel=1e-8)
         assert found[name].preload == pytest.approx(heat.preload, rel=1e-7)
+
+
+def test_a_fold_is_said_before_where_the_search_ended():
+    """What a designer can act on first: the lubricant of a state that does not exist is no cause."""
+    point = SimpleNamespace(speed=4000.0 * np.pi / 30.0)
+    error = no_equilibrium("spindle", point, "lubricant temperature: at 169 °C it is too thin.")
+    branch = SimpleNamespace(end="fold", limit=2126.0 * np.pi / 30.0, reason="")
+    text = str(beyond_the_branch(error, branch))
+    assert text.startswith(
+        "spindle: no thermal equilibrium at 4000 rpm: heat and preload feed each other, equilibria end in a "
+        "fold at 2126 rpm. Lower the speed"
+    )
+    assert text.endswith(
+        "(Heated beyond the fold it ends at: lubricant temperature: at 169 °C it is too thin.)"
+    )
+    other = SimpleNamespace(end="limit", limit=2126.0 * np.pi / 30.0, reason="too thin an oil.")
+    text = str(beyond_the_branch(error, other))
+    assert "4000 rpm: lubricant temperature" in text
+    assert "exists up to about 2126 rpm: too thin an oil." in text
