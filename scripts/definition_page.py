@@ -22,6 +22,7 @@ from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.definition.schema import (
     Shape,
     annotation_of,
+    is_text,
     literal_values,
     quantity_rule,
     registry_of,
@@ -279,7 +280,9 @@ def _allowed(annotation: Any, key: str) -> str:
     if key == "schema":
         return f'`"{next(iter(literal_values(annotation)), MACHINE_SCHEMA)}"`'
     if shape.kind == "table":
-        return "a table, see below"
+        beside = "a name, or " if is_text(annotation) else ""
+        beside = "a quantity, or " if quantity_rule(annotation) else beside
+        return f"{beside}a table, see below"
     if shape.kind == "mapping":
         inner = shape_of(shape.inner)
         return "tables by name, see below" if inner.kind == "table" else f"by name: {_entries(inner)}"
