@@ -42,7 +42,8 @@ def _words(found: Mapping[str, Any]) -> str:
         f"{_largest(found['differences'], 'after_K'):.2g} K apart. On what the two fits differ by, both "
         f"models agree within {_largest(found['differences'], 'change_K'):.2g} K."
     )
-    if moved := found["displacement_differences"]:
+    # Folders of before have none.
+    if moved := found.get("displacement_differences"):
         text += (
             f" Displacements are up to {_largest(moved, 'after_um'):.2g} µm apart, on what the fits differ "
             f"by {_largest(moved, 'change_um'):.2g} µm."
@@ -78,14 +79,14 @@ def _tables(content: Mapping[str, Any], found: Mapping[str, Any]) -> list[Table]
         "after, full model": found["after"]["channels"],
     }
     tables = [by_model, *_by_channel(temperatures, found["differences"], "channel", "K")]
-    if found["displacement_differences"]:
+    if moved := found.get("displacement_differences"):
         displacements = {
             "before, fast model": content["mismatch"]["displacements"],
             "before, full model": found["before"]["displacements"],
             "after, fast model": fit["displacements_after"],
             "after, full model": found["after"]["displacements"],
         }
-        tables += _by_channel(displacements, found["displacement_differences"], "sensor", "um")
+        tables += _by_channel(displacements, moved, "sensor", "um")
     return tables
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from spindle_fem.commands.console import print_diagnosis
 from spindle_fem.inference.next_measurement import lead_words
-from spindle_fem.report.diagnosis_tables import cards, fit_table, set_tables
+from spindle_fem.report.diagnosis_tables import cards, channel_table, fit_table, set_tables
 from spindle_fem.report.diagnosis_words import verdict_sentence
 
 STATEMENT = "312 W of heat enters the housing."
@@ -73,3 +73,14 @@ def test_errors_are_told_beside_the_noise_and_by_no_second_measure():
     table = fit_table(content("unexplained"))
     assert "0.07 K" in table.caption or "0.08 K" in table.caption
     assert "noise" not in str(table.columns).lower()
+
+
+def test_the_report_tells_of_displacements_in_micrometres():
+    error = {"channel": "S1", "rmse_um": 1.5, "noise_um": 0.1, "max_um": 4.0}
+    told = {
+        "mismatch": {"channels": [], "displacements": [error]},
+        "fit": {"channels_after": [], "displacements_after": [error | {"rmse_um": 0.2, "max_um": 0.5}]},
+    }
+    _, grown = channel_table(told)
+    assert "before / µm" in str(grown.columns)
+    assert "0.200" in str(grown.rows)
