@@ -77,7 +77,7 @@ class StageIteration:
         self._size, self._largest, self._last = size, 0.0, None
 
     def forget(self) -> None:
-        """Drop what earlier stages told: other inputs, another coupling."""
+        """Forget what earlier stages found: other inputs, another coupling."""
         self._count, self._last, self._size = 0, None, 0.0
         self._expected = self._largest = UNKNOWN_CONTRACTION
 

@@ -115,7 +115,7 @@
       mesh.layers.push(frames);
     });
   }
-  function told(value, digits) { const text = value.toFixed(digits); return (parseFloat(text) === 0 ? text.replace("-", "") : text).replace("-", "−"); }
+  function rounded(value, digits) { const text = value.toFixed(digits); return (parseFloat(text) === 0 ? text.replace("-", "") : text).replace("-", "−"); }
   function scaled(layer, value) { return (value - layer.low) / (layer.high - layer.low); }
   function restored(layer, share) { return layer.low + share * (layer.high - layer.low); }
 
@@ -339,7 +339,7 @@
     data.places.map(function (s) { return [s, onScreen(s.place)]; }).sort(function (a, b) { return b[1][1] - a[1][1]; }).forEach(function (pair) {
       const s = pair[0], where = pair[1].slice(), value = valueOf(s), digits = data.layers[state.layer].difference ? 2 : 1;
       const tag = document.createElement("span");
-      tag.textContent = s.name + (value === null ? "" : " " + told(value, digits));
+      tag.textContent = s.name + (value === null ? "" : " " + rounded(value, digits));
       // Names that would cover one another stand above one another.
       const wide = 7 * tag.textContent.length + 10, tall = 18;
       let free = false;
@@ -366,14 +366,14 @@
     draw(mode); gl.readPixels(x, y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); draw(0);
     return { pixel: pixel, x: 2 * (x + 0.5) / canvas.width - 1, y: 2 * (y + 0.5) / canvas.height - 1 };
   }
-  const TOLD = readout.textContent;
+  const HINT = readout.textContent;
   function readAt(event) {
     const near = placeNear(event), layer = data.layers[state.layer];
-    if (near) { const v = valueOf(near); readout.textContent = near.name + (v === null ? "" : ": " + told(v, 2) + " " + layer.unit); return; }
+    if (near) { const v = valueOf(near); readout.textContent = near.name + (v === null ? "" : ": " + rounded(v, 2) + " " + layer.unit); return; }
     const pixel = pixelAt(event, 1).pixel;
-    if (!pixel[3] || (current() === null && pixel[2] < 252)) { readout.textContent = TOLD; return; }
+    if (!pixel[3] || (current() === null && pixel[2] < 252)) { readout.textContent = HINT; return; }
     const name = pixel[2] === 254 ? rolling() : (data.parts[pixel[2]] || { name: "" }).name;
-    readout.textContent = name + ": " + told(restored(layer, (pixel[0] * 256 + pixel[1]) / 65535), layer.difference ? 2 : 1) + " " + layer.unit;
+    readout.textContent = name + ": " + rounded(restored(layer, (pixel[0] * 256 + pixel[1]) / 65535), layer.difference ? 2 : 1) + " " + layer.unit;
   }
   function placeNear(event) {
     if (!state.places) return null;
@@ -445,7 +445,7 @@
     let n = 0;
     picked.forEach(function (entry, key) {
       const item = document.createElement("li"), colour = entry.colour = CYCLE[n++ % CYCLE.length];
-      item.textContent = entry.title + (entry.value === null || entry.value === undefined || data.times.length > 1 ? "" : ": " + told(entry.value, 2) + " " + data.layers[state.layer].unit);
+      item.textContent = entry.title + (entry.value === null || entry.value === undefined || data.times.length > 1 ? "" : ": " + rounded(entry.value, 2) + " " + data.layers[state.layer].unit);
       item.style.color = colour;
       list.append(item);
       entry.curves.forEach(function (c, k) { curves.push({ name: entry.title + ", " + c.name, colour: colour, dash: DASHES[k % DASHES.length], times: c.times, values: c.values, several: entry.curves.length > 1 }); });
@@ -612,7 +612,7 @@
     bar.style.background = "linear-gradient(to right," + stops.join(",") + ")";
     const ticks = find(".view3d-ticks"), digits = layer.high - layer.low < 2 ? 2 : 1;
     ticks.textContent = "";
-    for (let i = 0; i <= 5; i++) { const s = document.createElement("span"); s.textContent = told(restored(layer, i / 5), digits) + (i === 5 ? " " + layer.unit : ""); ticks.append(s); }
+    for (let i = 0; i <= 5; i++) { const s = document.createElement("span"); s.textContent = rounded(restored(layer, i / 5), digits) + (i === 5 ? " " + layer.unit : ""); ticks.append(s); }
     find(".view3d-scale").textContent = layer.name + " / " + layer.unit;
   }
   data.notes.forEach(function (text) { const line = document.createElement("p"); line.className = "view3d-note"; line.textContent = text; host.append(line); });

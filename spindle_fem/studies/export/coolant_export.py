@@ -366,10 +366,10 @@ def wall_feedback(coolant: CoolantOperators, axes: tuple[Array, Array]) -> Feedb
             add(direction, strength[k] * left[:, k], right[k], np.zeros(len(fast.channels)))
         for row in np.flatnonzero(np.any(parts["output"][direction] != 0.0, axis=1)):
             shown = np.eye(len(fast.channels))[row]
-            told = np.concatenate(
+            weighted = np.concatenate(
                 (parts["output"][direction][row], parts["feedthrough"][direction][row, loads])
             )
-            add(direction, np.zeros(size), told, shown)
+            add(direction, np.zeros(size), weighted, shown)
     return FeedbackTable(
         wall.sense,
         {"coolant_inlet": -1.0},

@@ -167,9 +167,9 @@ def heat_powers(effects: ExportedEffects, inputs: Sequence[ModelInput]) -> list[
         moving = [name for name in ones if np.any(heat_of(term, {**ones, name: 2.0}) != base)]
         name = moving[0] if moving else ""
         doubled, other = (heat_of(term, {**ones, name: value}) for value in (2.0, 37.0))
-        for place, gain, twice, told in zip(term.heat_places, base, doubled, other, strict=True):
+        for place, gain, twice, far in zip(term.heat_places, base, doubled, other, strict=True):
             exponent = float(np.log2(twice / gain)) if gain else 0.0
-            if len(moving) > 1 or not np.isclose(told, gain * 37.0**exponent, rtol=1e-9):
+            if len(moving) > 1 or not np.isclose(far, gain * 37.0**exponent, rtol=1e-9):
                 raise SpecError(
                     "effect", f"the heat of {term.name} is no power of one input.", "Export without it."
                 )
