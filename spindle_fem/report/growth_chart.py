@@ -73,7 +73,8 @@ def deformed_machine(shapes: Mapping[str, BodyShape]) -> Figure | None:
         size = 1e6 * np.hypot(*shape.shift.T)
         colours = bar.colours(size[shape.cells].mean(axis=1))
         axes.add_collection(
-            PolyCollection(now[shape.cells], facecolors=colours, edgecolors=colours, linewidths=0.3)
+            # Smoothed edges of neighbouring cells would leave hairlines.
+            PolyCollection(now[shape.cells], facecolors=colours, edgecolors="face", antialiased=False)
         )
         axes.add_collection(LineCollection(now[shape.sides], colors=INK, linewidths=1.0))
         axes.add_collection(
