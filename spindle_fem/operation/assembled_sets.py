@@ -52,6 +52,7 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet |
         ),
         # Springs on bearings that all face one way are a load on them.
         preload=0.0 if group.spring_force else group.preload,
+        assembled_force=abs(group.spring_force),
         preload_kind="spring" if group.preload_kind == "spring" else "rigid",
         loop_stiffness=_loop_stiffness(spec, group),
         shaft_expansion=_seat_expansion(spec, group, "inner"),

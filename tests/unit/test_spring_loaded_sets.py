@@ -11,6 +11,7 @@ from spindle_fem.definition.load import find_machine, load_machine
 from spindle_fem.definition.solid_tables import Fit
 from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.machine.view.machine_names import MachineNames
+from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.preload_mechanics import PreloadMechanics
@@ -62,11 +63,27 @@ def test_springs_on_bearings_of_one_direction_hold_no_shaft():
         )
 
 
-def test_their_preload_is_no_effect_of_temperature():
-    spec = load_machine("motor_spindle", TANDEM)
+def fitted(*changes):
+    spec = load_machine("motor_spindle", [*changes, "mesh.preset=coarse"])
     fit = Fit(inner_interference="3 um", outer_clearance="6 um")
     sets = tuple(group.model_copy(update={"fit": fit}) for group in spec.bearing_set)
-    spec = spec.model_copy(update={"bearing_set": sets})
+    return spec.model_copy(update={"bearing_set": sets})
+
+
+def test_their_rings_are_seated_by_the_share_of_the_force():
+    # each of a tandem pair has half of it, each of an opposed pair all of it
+    tandem, opposed = (
+        BearingMechanics(spec, build_machine_network(spec).growth.seats).assembled_seats()
+        for spec in (fitted(*TANDEM, "bearing_set.rear.preload=400 N"), fitted())
+    )
+    assert tandem["R1"][0][0] > 0.0
+    for name in ("F1", "R1", "R2"):
+        for found, known in zip(tandem[name], opposed[name], strict=True):
+            assert found == pytest.approx(known, rel=1e-6)
+
+
+def test_their_preload_is_no_effect_of_temperature():
+    spec = fitted(*TANDEM)
     mechanics = PreloadMechanics(spec, frozenset(MachineNames.of(spec).place_names))
     assert mechanics("rear_bearings") is None
 

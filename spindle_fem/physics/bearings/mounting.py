@@ -65,6 +65,9 @@ class BearingSet:
     preload_kind : {"rigid", "spring"}
         Rigid (locknut) keeps the displacement of the rings; a spring on the
         outer rings of the bearings with orientation -1 keeps the force.
+    assembled_force : float, [N]
+        Of springs through bearings that all face one way, which is a load on them and no preload: what
+        seats their rings at assembly.
     loop_stiffness : float or None, [N/m]
         Of shaft, housing and spacers between the two sides of a rigid set: how they give way to its force
         beyond that of assembly. None: not at all.
@@ -90,6 +93,7 @@ class BearingSet:
     bearings: tuple[MountedBearing, ...]
     preload: float = 0.0
     preload_kind: Literal["rigid", "spring"] = "rigid"
+    assembled_force: float = 0.0
     shaft_expansion: float = STEEL_EXPANSION
     housing_expansion: float = STEEL_EXPANSION
     shaft_bore_diameter: float | None = None
@@ -157,9 +161,10 @@ class BearingSet:
         return approach
 
     def mounted_states(self) -> tuple[MountedState, ...]:
-        """Every bearing as assembled with preload on elastic seats."""
+        """Every bearing as assembled with its preload, or the force of its springs, on elastic seats."""
         sides = [bearing.orientation for bearing in self.bearings]
-        shares = tuple(self.preload / sides.count(side) for side in sides)
+        force = self.preload or self.assembled_force
+        shares = tuple(force / sides.count(side) for side in sides)
         return mounted_states(tuple(bearing.geometry for bearing in self.bearings), self.seats, shares)
 
 
