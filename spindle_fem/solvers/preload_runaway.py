@@ -111,12 +111,11 @@ class HeatResponse:
             entering[[nodes + ball for ball in balls], 3 * index + 2] = 1.0 / len(balls)
         passed_on = _passed_on(tied, entering)
         solved_for = np.setdiff1d(np.arange(count), list(passed_on))
-        warmed = np.zeros_like(entering)
+        matrix, n_lumped, tie = tied.full_matrix().astype(RESPONSE_PRECISION), system.n_lumped, system.tie
+        del system, tied  # their memory serves the solution
+        warmed = entering
         warmed[:, solved_for] = solve_many(
-            tied.full_matrix().astype(RESPONSE_PRECISION),
-            entering[:, solved_for],
-            solved.preconditioner,
-            relative_tolerance=RESPONSE_TOLERANCE,
+            matrix, entering[:, solved_for], solved.preconditioner, relative_tolerance=RESPONSE_TOLERANCE
         )
         for column, (shares, warmer) in passed_on.items():
             warmed[:, column] = warmed[:, column - 2 : column] @ shares
@@ -129,7 +128,7 @@ class HeatResponse:
 
         own = solved.temperature, solved.lumped_temperature
         heated = around(*own)
-        rises = [split_unknowns(column, system.n_lumped, system.tie) for column in warmed.T]
+        rises = [split_unknowns(column, n_lumped, tie) for column in warmed.T]
         self.per_watt = np.stack(
             [around(own[0] + field, own[1] + lumped) - heated for field, lumped in rises], axis=-1
         )
