@@ -1,13 +1,19 @@
 """What tests of several folders share."""
 
+from __future__ import annotations
+
 import gc
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import pandas as pd
 import pytest
 
 from tests.support.written_texts import manifest_text
+
+if TYPE_CHECKING:
+    # the controller of the workers imports this file before they start
+    import pandas as pd
 
 # Modules and collected tests are millions of objects that stay: searching them for garbage again and again
 # took a tenth of the processor time.
