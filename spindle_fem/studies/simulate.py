@@ -117,7 +117,7 @@ def _simulate_geometry(
         earlier_recordings = [with_displacements(item) for item in calibration]
         earlier = Predictor(fast, earlier_recordings, effects=effects, at_stamps=True)
         result = fit_parameters(earlier, progress=progress)
-    drives = (with_resolved_jumps(drive_of_recording(spec, recording)),)
+    drives = (with_resolved_jumps(drive_of_recording(spec, recording), fast.model.size),)
     predictor = Predictor(fast, [recording], effects=effects, at_stamps=True, drives=drives)
     factors = {} if result is None else result.factors
     if result is not None and followed.follows_preload:

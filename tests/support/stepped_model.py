@@ -54,7 +54,7 @@ def readings_along(model, drive, given, most_steps=None):
 
 def resolved_run(fast, drive, start, **given):
     """A drive as simulate runs it, with short steps after jumps; exported models take theirs."""
-    return simulate_fast(fast, with_resolved_jumps(drive), start, **given)
+    return simulate_fast(fast, with_resolved_jumps(drive, fast.model.size), start, **given)
 
 
 def told_and_found(folder, machine, overrides, recording):

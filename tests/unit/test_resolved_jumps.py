@@ -10,6 +10,7 @@ from spindle_fem.model.reduced.resolved_jumps import shorter_steps, with_resolve
 
 HELD = np.array([True, True, False, False, True])
 MINUTES = np.arange(0.0, 3601.0, 60.0)
+SIZE = 200  # unknowns of a fast model
 
 
 def drive_of(speed, inlet=288.15, held=HELD):
@@ -26,7 +27,7 @@ def divided(drive, found):
 def test_steps_are_short_after_the_start_and_after_jumps_and_grow_with_the_time_since():
     speed = np.where(MINUTES < 1200.0, 100.0, 300.0)
     drive = drive_of(speed)
-    found = with_resolved_jumps(drive)
+    found = with_resolved_jumps(drive, SIZE)
     assert divided(drive, found) == [0, 1, 20, 21]
     assert np.isin(MINUTES, found.grid).all()
     for jump in (0.0, 1200.0):
@@ -40,7 +41,7 @@ def test_steps_are_short_after_the_start_and_after_jumps_and_grow_with_the_time_
 
 def test_inputs_are_what_they_were_at_all_times():
     drive = drive_of(np.where(MINUTES < 1200.0, 0.0, 300.0), inlet=288.15 + np.sin(MINUTES))
-    found = with_resolved_jumps(drive)
+    found = with_resolved_jumps(drive, SIZE)
     # just after each time, and so never across a jump
     times = np.linspace(0.0, 3599.0, 5000)
     meant, now = inputs_at(drive, times), inputs_at(found, times)
@@ -59,12 +60,12 @@ def test_inputs_are_what_they_were_at_all_times():
 )
 def test_what_does_not_matter_divides_nothing(speed, inlet):
     drive = drive_of(speed, inlet)
-    assert divided(drive, with_resolved_jumps(drive)) == [0, 1]
+    assert divided(drive, with_resolved_jumps(drive, SIZE)) == [0, 1]
 
 
 def test_a_steep_change_has_steps_within_which_heat_is_nearly_straight():
     drive = drive_of(np.where(MINUTES < 1200.0, 0.0, 300.0), held=np.zeros(5, dtype=bool))
-    found = with_resolved_jumps(drive)
+    found = with_resolved_jumps(drive, SIZE)
     column = found.column("speed")
     changed = np.abs(found.end[:, column] - found.start[:, column])
     assert changed.max() <= 30.0 + 1e-9
@@ -72,16 +73,18 @@ def test_a_steep_change_has_steps_within_which_heat_is_nearly_straight():
     assert divided(drive, found) == [0, 1, 19, 20, 21]
 
 
-def test_jumps_without_end_let_only_larger_ones_count_and_say_so():
+def test_jumps_without_end_have_longer_steps_then_only_larger_ones_count_and_it_says_so():
     rng = np.random.default_rng(3)
-    speed = 200.0 + 100.0 * rng.random(MINUTES.size)
-    quiet, loud = drive_of(300.0), drive_of(speed)
-    assert with_resolved_jumps(quiet).notes == quiet.notes
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(resolved_jumps, "MOST_KINDS", 150)
-        found = with_resolved_jumps(loud)
-    assert len(found.steps) < len(with_resolved_jumps(loud).steps)
-    assert "inputs jump so often" in found.notes[-1]
+    loud = drive_of(200.0 + 100.0 * rng.random(MINUTES.size))
+    assert with_resolved_jumps(loud, 100).notes == loud.notes
+    counts = []
+    for size, words in ((300, "times as long"), (2000, "changes of less than")):
+        found = with_resolved_jumps(loud, size)
+        assert words in found.notes[-1]
+        counts.append(len(found.steps))
+        times = np.linspace(0.0, 3599.0, 1000)
+        np.testing.assert_allclose(inputs_at(found, times)["speed"], inputs_at(loud, times)["speed"])
+    assert len(with_resolved_jumps(loud, 100).steps) > counts[0] > counts[1]
 
 
 @pytest.mark.parametrize("rate", [0.02, 0.1, 0.5])
@@ -115,7 +118,7 @@ def test_rows_a_minute_apart_read_as_rows_a_second_apart(fast, held):
     # just after each second, as the rows have it, and straight between seconds
     fine = make_drive(seconds, STANDARD, values, np.array([held, True, False, False, True]))
     meant = simulate_fast(fast, fine, 293.15).temperature[::60]
-    found = simulate_fast(fast, with_resolved_jumps(rows), 293.15).temperature
+    found = simulate_fast(fast, with_resolved_jumps(rows, SIZE), 293.15).temperature
     coarse = simulate_fast(fast, rows, 293.15).temperature
     assert np.abs(found - meant).max() < 5e-3
     assert np.abs(coarse - meant).max() > 0.05

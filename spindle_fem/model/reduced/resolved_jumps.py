@@ -25,12 +25,11 @@ FIRST, GROWTH = 0.5, 0.5
 # Largest change of an input within a step, in jumps that count, as heat is no straight line over the speed;
 # and the shortest step that this makes [s].
 MOST_JUMPS, SHORTEST = 10.0, 2.0
-# Operators and lengths of steps: each pair has matrices of its own, together half a gigabyte. Jumps count
-# from so many times their least size at most.
-MOST_KINDS, LARGEST_FACTOR = 500, 64.0
+# Memory for matrices of steps, of which each operator and length of step has so many.
+MOST_BYTES, MATRICES = 1.2e9, 6
 
 
-def shorter_steps(length: float, since: float, longest: float) -> list[float]:
+def shorter_steps(length: float, since: float, longest: float, coarseness: float = 1.0) -> list[float]:
     """Steps [s] into which one is divided.
 
     Parameters
@@ -40,6 +39,8 @@ def shorter_steps(length: float, since: float, longest: float) -> list[float]:
         From the last jump to its start.
     longest : float, [s]
         Of the steps asked for.
+    coarseness : float
+        Steps are so many times as long.
 
     >>> shorter_steps(10.0, 0.0, 60.0)
     [0.5, 0.5, 0.5, 0.75, 1.125, 1.6875, 2.46875, 2.46875]
@@ -48,7 +49,7 @@ def shorter_steps(length: float, since: float, longest: float) -> list[float]:
     """
     found, left = [], length
     while True:
-        allowed = min(longest, max(FIRST, GROWTH * since))
+        allowed = min(longest, coarseness * max(FIRST, GROWTH * since))
         # no last one that is much shorter than the one before
         step = left if left <= allowed * (1.0 + 1e-9) else min(allowed, 0.5 * left)
         found.append(step)
@@ -57,31 +58,37 @@ def shorter_steps(length: float, since: float, longest: float) -> list[float]:
             return found
 
 
-def with_resolved_jumps(drive: Drive) -> Drive:
+def with_resolved_jumps(drive: Drive, size: int) -> Drive:
     """A drive whose steps are short after its start, after inputs jump or bend, and while they change much.
 
     Inputs are those of the drive at all times; steps grow with the time since, so that every mode of the
-    machine meets steps that are short for it. Where inputs jump all the time, only larger jumps count, and a
-    note of the drive says which. For drives whose readings have classes of their own.
+    machine meets steps that are short for it. Where these would need too many matrices, they are longer, and
+    then only larger jumps count; a note of the drive says so. For drives whose readings have own classes.
+
+    Parameters
+    ----------
+    size : int
+        Unknowns of the fast model.
     """
-    least, times = _least(drive), 1.0
-    while True:
-        found = _divided(drive, times * least)
+    least, most = _least(drive), MOST_BYTES / (MATRICES * 8 * size**2)
+    for coarseness, times in ((1.0, 1.0), (2.0, 1.0), (4.0, 1.0), *((4.0, 2.0**n) for n in range(1, 8))):
+        found = _divided(drive, times * least, coarseness)
         kinds = np.unique(np.column_stack((found.step_class, np.round(1e6 * found.steps))), axis=0)
-        if len(kinds) <= MOST_KINDS or times > LARGEST_FACTOR:
+        if len(kinds) <= most:
             break
-        times *= 2.0
-    if times == 1.0:
+    if coarseness == 1.0:
         return found
-    share = f"{100.0 * times * LEAST_SHARE['speed']:.3g} %"
-    note = (
-        f"inputs jump so often that short steps follow changes above {share} of the highest speed only (and "
-        "others alike): up to a minute after smaller ones, readings can be off by some hundredths of a kelvin"
-    )
+    note = f"inputs jump so often that steps after jumps are {coarseness:.0f} times as long as usual: for a "
+    note += "minute readings can be off by some hundredths of a kelvin"
+    if times > 1.0:
+        share = f"{100.0 * times * LEAST_SHARE['speed']:.3g} %"
+        note += (
+            f", and by tenths after changes of less than {share} of the highest speed, which count for none"
+        )
     return replace(found, notes=(*found.notes, note))
 
 
-def _divided(drive: Drive, least: Array) -> Drive:
+def _divided(drive: Drive, least: Array, coarseness: float) -> Drive:
     """A drive with short steps after jumps above some sizes, (m,)."""
     grid, start, end, steps = drive.grid, drive.start, drive.end, drive.steps
     changed = (end - start) / least
@@ -92,7 +99,7 @@ def _divided(drive: Drive, least: Array) -> Drive:
     since, lengths = 0.0, []
     for length, begins, number in zip(steps.tolist(), disturbed.tolist(), pieces.tolist(), strict=True):
         since = 0.0 if begins else since
-        lengths.append(shorter_steps(length, since, max(SHORTEST, length / number)))
+        lengths.append(shorter_steps(length, since, max(SHORTEST, length / number), coarseness))
         since += length
     counts = [len(own) for own in lengths]
     owner = np.repeat(np.arange(len(steps)), counts)
