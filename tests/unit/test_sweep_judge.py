@@ -163,3 +163,17 @@ def test_growth_and_preload_are_outputs_of_full_solves():
     assert not only_full("bearings.F3.preload_N")
     # without a flange nothing holds the nose
     assert "growth.nose_axial_um" not in output_paths(load_machine("small_two_start"))
+
+
+def test_what_a_stream_does_is_an_output_of_machines_with_streams():
+    spec = load_machine("grinding_spindle")
+    paths = set(output_paths(spec))
+    named = {path for path in paths if path.startswith("circuits.")}
+    stems = {path.rsplit(".", 1)[0] for path in named}
+    assert stems == {f"circuits.{circuit.name}" for circuit in spec.circuits}
+    assert named
+    assert all(map(only_full, named))
+    stem = min(stems)
+    assert unit_of(f"{stem}.pressure_drop_Pa").text == "Pa"
+    assert unit_of(f"{stem}.outlet_degC").text == "°C"
+    assert not any(path.startswith("circuits.") for path in output_paths(load_machine("uncooled")))

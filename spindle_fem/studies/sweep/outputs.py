@@ -66,6 +66,10 @@ _COOLANT = (
     "film_coefficient_W_m2K.value", "film_coefficient_W_m2K.low", "film_coefficient_W_m2K.high",
     "pressure_drop_Pa", "pumping_power_W", "wetted_area_m2", "length_m", "hydraulic_diameter_m",
 )  # fmt: skip
+_CIRCUIT = (
+    "flow_m3_s", "inlet_degC", "outlet_degC", "heat_W", "reynolds", "prandtl", "velocity_m_s",
+    "film_coefficient_W_m2K", "pressure_drop_Pa", "wetted_area_m2",
+)  # fmt: skip
 _GENERAL = (
     "temperature.min_degC", "temperature.max_degC", "energy.heat_in_W", "energy.imbalance_relative",
     "mesh.nodes", "mesh.elements", "mesh.min_quality",
@@ -80,7 +84,7 @@ COOLER_HEAT = "derived.cooler_heat_W"
 # How the nose bends aside, where a machine has two sets of bearings.
 _NOSE_ASIDE = ("radial_up_um", "radial_across_um", "tilt_up_urad", "tilt_across_urad")
 # Summary blocks, and one number, that only a solve of the whole field has.
-_ONLY_FULL = ("growth.", "displacements.", "equilibrium.", "energy.imbalance_relative")
+_ONLY_FULL = ("circuits.", "growth.", "displacements.", "equilibrium.", "energy.imbalance_relative")
 # Outputs that are words, which no limit or objective can use.
 WORDS = frozenset({"coolant.regime"})
 
@@ -118,6 +122,8 @@ def _paths(spec: MachineSpec) -> Iterator[str]:
     if spec.channel is not None:
         yield from (f"coolant.{key}" for key in _COOLANT)
         yield COOLER_HEAT
+    for circuit in spec.circuits:
+        yield from (f"circuits.{circuit.name}.{key}" for key in _CIRCUIT)
     yield from (f"probes.{probe.name}" for probe in spec.probe)
     cooled = [surface for film in spec.film for surface in film.surface]
     if spec.channel is not None:
