@@ -300,8 +300,8 @@ def test_speeds_beyond_the_table_get_a_range_of_their_own(fast, monkeypatch):
 
     monkeypatch.setattr("spindle_fem.model.reduced.recorded_model.reduced_model_of", remember)
     for speed in (4000.0, 6000.0):
-        given = {"source": "made", "input_names": ("speed",), "inputs": np.array([[speed * RPM]])}
-        recording = SimpleNamespace(**given)
+        given = {"input_names": ("speed",), "input_units": ("rad/s",), "inputs": np.array([[speed * RPM]])}
+        recording = SimpleNamespace(source="made", **given)
         fast_model_for(fast.spec, [recording])
     assert asked[0].highest_speed is None
     assert asked[1].highest_speed == pytest.approx(6000.0 * RPM)

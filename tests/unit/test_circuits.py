@@ -96,7 +96,7 @@ def test_walls_of_one_temperature_warm_the_coolant_as_the_exchanger_has_it(cells
     film = circuit(cells=cells)
     rate, conductance = duct_flow(film).capacity_rate, 170.0
     each = dict.fromkeys(film.surface, conductance / cells)
-    coolant, outlet = coolant_temperatures(film, each, dict.fromkeys(film.surface, 313.15))
+    coolant, outlet = coolant_temperatures(film, each, dict.fromkeys(film.surface, 313.15), 293.15)
     assert outlet == pytest.approx(313.15 - 20.0 * math.exp(-conductance / rate), abs=1e-10)
     heat = sum(each[name] * (313.15 - coolant[name]) for name in each)
     assert heat == pytest.approx(rate * (outlet - 293.15), rel=1e-12)
@@ -108,7 +108,8 @@ def test_walls_of_one_flux_warm_the_coolant_evenly():
     middle = (np.arange(40) + 0.5) / 40.0
     wall = 293.15 + flux * middle / rate + flux / conductance
     each = dict.fromkeys(film.surface, conductance / 40)
-    coolant, outlet = coolant_temperatures(film, each, dict(zip(film.surface, wall.tolist(), strict=True)))
+    walls = dict(zip(film.surface, wall.tolist(), strict=True))
+    coolant, outlet = coolant_temperatures(film, each, walls, 293.15)
     assert outlet - 293.15 == pytest.approx(flux / rate, rel=1e-3)
     assert list(coolant.values()) == pytest.approx((293.15 + flux * middle / rate).tolist(), abs=0.01)
 
@@ -116,7 +117,7 @@ def test_walls_of_one_flux_warm_the_coolant_evenly():
 def test_both_walls_of_an_annulus_share_their_coolant():
     film = circuit(duct="annulus", diameter="100 mm", outer_diameter="110 mm", cells=2)
     each = dict(zip(film.surface, (30.0, 10.0, 30.0, 10.0), strict=True))
-    coolant, outlet = coolant_temperatures(film, each, dict.fromkeys(film.surface, 313.15))
+    coolant, outlet = coolant_temperatures(film, each, dict.fromkeys(film.surface, 313.15), 293.15)
     assert coolant["bore.inner.1"] == coolant["bore.outer.1"] < coolant["bore.inner.2"]
     heat = sum(each[name] * (313.15 - coolant[name]) for name in each)
     assert heat == pytest.approx(duct_flow(film).capacity_rate * (outlet - 293.15), rel=1e-12)

@@ -48,7 +48,7 @@ def balance(film, wall):
     """Heat that walls give and that the stream carries away, and its outlet, W and K."""
     conductance = dict.fromkeys(film.surface, 3.0)
     walls = dict(zip(film.surface, wall, strict=True))
-    bulk, outlet = coolant_temperatures(film, conductance, walls)
+    bulk, outlet = coolant_temperatures(film, conductance, walls, film.inlet_temperature)
     given = sum(3.0 * (walls[name] - bulk[name]) for name in film.surface)
     return given, capacity_rate(film) * (outlet - film.inlet_temperature), bulk
 

@@ -60,7 +60,7 @@ def test_what_raceways_give_the_stream_carries_away(spec):
     own = film(spec, "R1")
     names, conductance = own.surface, {own.surface[0]: 3.0, own.surface[1]: 5.0}
     wall = {names[0]: 330.0, names[1]: 310.0}
-    bulk, outlet = coolant_temperatures(own, conductance, wall)
+    bulk, outlet = coolant_temperatures(own, conductance, wall, own.inlet_temperature)
     given = sum(conductance[name] * (wall[name] - bulk[name]) for name in names)
     assert given == pytest.approx(capacity_rate(own) * (outlet - own.inlet_temperature), rel=1e-12)
     # One mixed stream past walls of their common mean: 1 - exp(-N) of the rise.

@@ -16,7 +16,7 @@ FOLDER = Path(__file__).parents[2] / "validation"
 # What diagnoses cases, holds results against answers or draws them; nothing that makes cases is among them.
 CALL_THE_PROGRAM = (
     "run_study", "riddle", "reliability", "calibration_coverage", "plan_check", "watch_delay", "causes",
-    "proof_pictures",
+    "proof_pictures", "solid_growth", "calculix",
 )  # fmt: skip
 
 
