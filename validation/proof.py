@@ -143,6 +143,7 @@ def real_machines(results: Path | None, recordings: Path | None) -> list[dict[st
             | {
                 "verdict": diagnosis["verdict"],
                 "set_probability": diagnosis.get("set_probability"),
+                "reason": diagnosis["reason"] if diagnosis["verdict"] == "unexplained" else "",
                 "findings": [
                     {k: f.get(k) for k in ("effect", "component", "statement")} for f in diagnosis["findings"]
                 ],

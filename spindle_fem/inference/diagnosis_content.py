@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from spindle_fem.effects.framework.effect import capital
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, MISDESCRIBED_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import (
@@ -108,10 +109,10 @@ def _reasons(opened: DiagnosedMachine, judgement: Judgement) -> tuple[str, ...]:
         return (judgement.reason,)
     unexplained = judgement.verdict == "unexplained" and not judgement.chosen.fit.candidates
     if not unexplained or judgement.left > coarse.left_with_them:
-        return coarse.statement, judgement.reason
+        return coarse.statement, capital(judgement.reason)
     return (
         coarse.statement,
-        judgement.reason + ".",
+        f"{capital(judgement.reason)}.",
         f"Its calibration leaves {coarse.left_with_them:.1f} times: nothing says that the machine has "
         "changed since.",
     )
