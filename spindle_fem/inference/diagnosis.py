@@ -71,6 +71,8 @@ class Diagnosis:
         Direction whose prior was given up.
     followed : Followed or None
         The chosen set with states and moments that all readings tell.
+    notes : tuple of str
+        What could not be done as usual.
     """
 
     predictor: Predictor
@@ -87,6 +89,7 @@ class Diagnosis:
     seconds: Mapping[str, float]
     wrong: WrongDirection | None = None
     followed: Followed | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def stated_fit(self) -> Fit:
@@ -181,9 +184,13 @@ def diagnose_recordings(
     unchanged = predictor
     if machine.is_network:
         unchanged = with_misdescriptions(predictor, directions, empty.fit.values)
+    notes: tuple[str, ...] = ()
     if directions:
         # A set changes what directions do; calibration knows them by what they did without it.
-        predictor = with_misdescriptions(predictor, directions, best.fit.values, best.fit.candidates)
+        try:
+            predictor = with_misdescriptions(predictor, directions, best.fit.values, best.fit.candidates)
+        except NOT_SIMULATED as error:
+            notes = (f"What drawings leave open is taken about nothing missing, not about the set: {error}",)
     final = Problem(predictor, belief, slow, predictor.observations)
     overlapping = overlapping_components(view)
     refitted = _refit(final, found, workers, overlapping, FollowedReadings(final, final), coarseness)
@@ -239,6 +246,7 @@ def diagnose_recordings(
         clock.laps,
         wrong,
         readings.followed(judgement.chosen.fit),
+        notes,
     )
 
 

@@ -88,7 +88,11 @@ def diagnosis_content(
         "candidates_tried": diagnosis.candidates_tried,
         "hypotheses_fitted": len(diagnosis.hypotheses),
         "seconds": dict(diagnosis.seconds),
-        "notes": [*opened.notes, *dict.fromkeys(note for drive in predictor.drives for note in drive.notes)],
+        "notes": [
+            *opened.notes,
+            *diagnosis.notes,
+            *dict.fromkeys(note for drive in predictor.drives for note in drive.notes),
+        ],
         "defects": [recording.defects.to_json() for recording in predictor.recordings],
         "versions": package_versions(),
     }
