@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Problem
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import expected_slow_error, known_before
@@ -80,7 +80,10 @@ def other_clocks(machine: DiagnosedMachine) -> Iterator[tuple[str, DiagnosedMach
 
         def misfit(log_rate: float, steps: int = 0, at: Callable = at) -> float:
             """Of all recordings, after some steps of a fit from the parameters that they give together."""
-            return prepared(at(np.exp(log_rate))).fit((), values, iterations=steps).misfit_with_prior
+            try:
+                return prepared(at(np.exp(log_rate))).fit((), values, iterations=steps).misfit_with_prior
+            except NOT_SIMULATED:
+                return np.inf
 
         coarse = min(LOG_RATES, key=misfit)
         if abs(coarse) <= LEAST_OFF:
