@@ -54,8 +54,10 @@ def run_search(search: Search) -> list[Hypothesis]:
         worst = best.score - search.reach(size)
         ranked = [h for h in search.ranked() if len(h.keys) == size and h.score > worst]
         search.progress(f"diagnosis: {size + 1} effects")
-        # A third effect is rare: it is looked for only where two leave something.
-        beam = int(size == 1) if search.is_explained(best) else tuned.BEAM
+        # What fits within the errors may lack an effect still, which the misfit hides among many readings: what a
+        # further one promises says so. Nothing missing, and a network, whose laws are coarse, are taken as they are.
+        enough = search.is_explained(best) and (is_network or not best.keys)
+        beam = int(size == 1) if enough else tuned.BEAM
         for hypothesis in to_extend(search, ranked, beam):
             screened, intervals = search.screened(hypothesis.fit)
             search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS)
