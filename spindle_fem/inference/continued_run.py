@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import SpecError
 from spindle_fem.inference.candidate_response import BaseRun
-from spindle_fem.inference.coordinate_names import NO_VALUES
+from spindle_fem.inference.coordinate_names import NO_VALUES, run_name
 from spindle_fem.inference.drive_steps import coarse_drive
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import direction_columns, misdescriptions_of
 from spindle_fem.inference.observations import Observation, observe
 from spindle_fem.inference.prediction import Prediction
-from spindle_fem.inference.predictor import STEP, Predictor, run_name
+from spindle_fem.inference.predictor import STEP, Predictor
 from spindle_fem.inference.structural_misdescriptions import StructuralChange, model_with_directions
 from spindle_fem.model.reduced.defined_effects import ActiveEffects
 from spindle_fem.model.reduced.drive import Drive

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from types import MappingProxyType
 
 # Factor of a candidate on a parameter of the machine: ``effect:<parameter>``. The machine's own factor on the
@@ -13,7 +14,8 @@ PROBE_PREFIX = "probe."
 DIRECTIONS = ("r", "z")
 # Temperature of a node at the start of one recording: ``start.<recording>.initial.<node>``.
 START_PREFIX = "start."
-# How long before the middle of a gap an input had changed, s: ``jump.<recording>.<number>``.
+# How much earlier than it is drawn, amid a gap or at the row that shows it, an input had changed, s:
+# ``jump.<recording>.<number>``.
 JUMP_PREFIX = "jump."
 # Events within a piece of a gap beyond what the inputs beside it indicate,
 # ``within_gap.<recording>.<number>``: friction of a bearing set, as a share of the highest that it gives; an
@@ -28,3 +30,14 @@ OF_ONE_RECORDING = (START_PREFIX, JUMP_PREFIX, GAP_PREFIX, MISDESCRIBED_IN_PREFI
 FIRST_ORDER = (PROBE_PREFIX, JUMP_PREFIX, GAP_PREFIX, MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)
 
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
+
+
+@lru_cache(maxsize=65536)
+def run_name(number: int, name: str) -> str | None:
+    """Name of a coordinate in the run of one recording; None if it does not enter."""
+    if name.startswith(FIRST_ORDER):
+        return None
+    if name.startswith(START_PREFIX):
+        owner, _, own = name.removeprefix(START_PREFIX).partition(".")
+        return own if int(owner) == number else None
+    return name.removeprefix(EFFECT_PREFIX)

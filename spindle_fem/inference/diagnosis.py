@@ -333,7 +333,7 @@ def _refit(
     ]
     # Sets far behind the first need not be fitted to their optimum, but for its parts: they are what is
     # named where the rest of it is not needed.
-    begun = problem.fit(first.candidates, first.values, iterations=0).misfit_with_prior
+    begun = problem.cost_at(first.candidates, first.values)
     behind = begun + 2.0 * tuned.HOPELESS_SCORE
     orders = [
         FitOrder(

@@ -214,10 +214,29 @@ class Problem:
     def begins_better(self, fit: Fit, start: Mapping[str, float]) -> bool:
         """Whether values leave less of a set than its fit, which ended elsewhere."""
         try:
-            begun = self.fit(fit.candidates, start, iterations=0)
+            return self.cost_at(fit.candidates, start) < fit.misfit_with_prior
         except NOT_SIMULATED:
             return False
-        return begun.misfit_with_prior < fit.misfit_with_prior
+
+    def cost_at(self, candidates: Sequence[Candidate], start: Mapping[str, float]) -> float:
+        """Misfit of a set with its prior at values by name, without fitting any."""
+        coordinates, position = self._begun(candidates, start)
+        return _Objective(self, candidates, coordinates).at(position, None).cost
+
+    def _begun(
+        self, candidates: Sequence[Candidate], start: Mapping[str, float]
+    ) -> tuple[tuple[Coordinate, ...], Array]:
+        """Coordinates of a set, and the position of values by name within their bounds.
+
+        What is known of the machine, and the candidates' nominal values, where a name is absent.
+        """
+        own = tuple(c for candidate in candidates for c in candidate_coordinates(candidate))
+        coordinates = (*self.belief.coordinates, *own)
+        position = np.concatenate((self.belief.start, np.zeros(len(own))))
+        for index, coordinate in enumerate(coordinates):
+            if coordinate.name in start:
+                position[index] = coordinate.of(start[coordinate.name])
+        return coordinates, np.clip(position, [c.low for c in coordinates], [c.high for c in coordinates])
 
     def fit(
         self,
@@ -245,16 +264,9 @@ class Problem:
         ConvergenceError
             No step lowers the misfit from a point that can be simulated.
         """
-        own = tuple(c for candidate in candidates for c in candidate_coordinates(candidate))
-        coordinates = (*self.belief.coordinates, *own)
-        given = dict(start or {})
-        position = np.concatenate((self.belief.start, np.zeros(len(own))))
-        for index, coordinate in enumerate(coordinates):
-            if coordinate.name in given:
-                position[index] = coordinate.of(given[coordinate.name])
+        coordinates, position = self._begun(candidates, start or {})
         low = np.array([c.low for c in coordinates])
         high = np.array([c.high for c in coordinates])
-        position = np.clip(position, low, high)
         objective = _Objective(self, candidates, coordinates)
         point = objective.at(position, None)
         slopes = objective.slopes(point)
@@ -286,14 +298,14 @@ class Problem:
                 if trial is not None and trial.cost < point.cost - 1e-9:
                     gain = point.cost - trial.cost
                     point = trial
-                    slopes = objective.slopes(point)
                     damping = max(damping / 10.0, 1e-6)
                     break
                 if largest < 1e-6:
                     break
                 refused = move
                 damping *= 10.0
-            # A step that was taken gains more than nothing.
+            # A step that was taken gains more than nothing. The last one gains so little that the derivatives
+            # before it serve.
             if gain == 0.0 or gain < (
                 EXACT_SHARE * point.cost
                 if exact
@@ -302,6 +314,7 @@ class Problem:
                 break
             if iteration >= tuned.HOPELESS_AFTER and point.cost - tuned.HOPELESS_REACH * gain > hopeless:
                 break
+            slopes = objective.slopes(point)
         if not np.isfinite(point.cost):
             raise ConvergenceError("diagnosis", "a hypothesis cannot be simulated at any of its parameters.")
         precision = slopes.curvature(point)
@@ -309,6 +322,7 @@ class Problem:
         _, log_det = np.linalg.slogdet(precision)
         _, log_root = np.linalg.slogdet(self.belief.root)
         # A prior that ends at bounds is so much denser between them.
+        own = coordinates[len(self.belief.coordinates) :]
         cut_off = -sum(float(np.log(norm.cdf(c.high) - norm.cdf(c.low))) for c in own)
         return Fit(
             tuple(candidates),

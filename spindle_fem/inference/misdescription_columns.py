@@ -63,7 +63,7 @@ def with_misdescriptions(
         if acting:
             found, _ = direction_columns(BaseRun(predictor, number, values, candidates), acting)
             columns |= {(number, item.coordinate): found[:, :, i] for i, item in enumerate(acting)}
-    return predictor.misdescribed_by(directions, columns)
+    return predictor.misdescribed_by(directions, columns, (dict(values), tuple(candidates)))
 
 
 def direction_columns(base: BaseRun, directions: Sequence[Misdescription]) -> tuple[Array, Array]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +19,12 @@ from spindle_fem.effects.framework.term import Term
 from spindle_fem.inference.coordinate_names import (
     DIRECTIONS,
     EFFECT_PREFIX,
-    FIRST_ORDER,
     GAP_PREFIX,
     JUMP_PREFIX,
     NO_VALUES,
     PROBE_PREFIX,
     START_PREFIX,
+    run_name,
 )
 from spindle_fem.inference.drive_steps import coarse_drive, even_drive
 from spindle_fem.inference.misdescription import Misdescription
@@ -33,6 +32,7 @@ from spindle_fem.inference.observations import Observation, observe
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.priors import Prior, priors_of
 from spindle_fem.inference.recording_gaps import (
+    channel_changes,
     gap_pieces,
     hidden_forcing,
     hidden_in,
@@ -106,6 +106,7 @@ class Predictor:
             for recording, gaps in zip(self.recordings, self._gaps, strict=True)
         ]
         self._slopes: dict[tuple[str, int], Array] = {}
+        self._about: tuple[Mapping[str, float], Sequence[Candidate]] = ({}, ())
         self.misdescribed: tuple[Misdescription, ...] = ()
         self.unseen: tuple[Array, ...] = ()
         self._columns: dict[tuple[int, str], Array] = {}
@@ -162,7 +163,10 @@ class Predictor:
         return found
 
     def misdescribed_by(
-        self, directions: Sequence[Misdescription], columns: Mapping[tuple[int, str], Array]
+        self,
+        directions: Sequence[Misdescription],
+        columns: Mapping[tuple[int, str], Array],
+        about: tuple[Mapping[str, float], Sequence[Candidate]] = ({}, ()),
     ) -> Predictor:
         """The predictor with directions in which the machine may differ from its definition.
 
@@ -170,9 +174,12 @@ class Predictor:
         ----------
         columns : mapping of (recording, coordinate) to (G + 1, c) ndarray, [K]
             Change of every channel for each unit of a direction; none where it does nothing.
+        about : values and candidates
+            Of the run that they, and what gaps and rows leave open, are worked out about.
         """
         found = copy.copy(self)
         found.misdescribed, found._columns, found._stacked = tuple(directions), dict(columns), {}
+        found._about, found._slopes = about, {}
         return found
 
     def column_of(self, number: int, coordinate: str) -> Array | None:
@@ -181,7 +188,7 @@ class Predictor:
 
     def misdescribed_like(self, other: Predictor) -> Predictor:
         """The predictor with the directions of another predictor of the same recordings."""
-        return self.misdescribed_by(other.misdescribed, other._columns)
+        return self.misdescribed_by(other.misdescribed, other._columns, other._about)
 
     # ------------------------------------------------------------------ what is uncertain
     def uncertain(self) -> tuple[Prior, ...]:
@@ -423,16 +430,14 @@ class Predictor:
     def _slopes_of(self, kind: str, number: int) -> Array:
         """Change of the channels (G + 1, c, n): K for each second that an input changed earlier, or K."""
         if (kind, number) not in self._slopes:
-            run = self.transient(number, {})
-            states, tracks = run.march(self.start(number))
+            values, candidates = self._about
+            run = self.transient(number, values, candidates)
+            states, tracks = run.march(self.start(number, values))
             if kind == JUMP_PREFIX:
                 forcing = jump_forcing(run, states, self._jumps[number])
             else:
                 forcing = hidden_forcing(run, self.fast, self._hidden[number])
-            tangent = run.tangents(forcing, tracks)
-            owner = np.append(run.drive.step_class, run.drive.step_class[-1])
-            outputs = np.array([item.outputs[self.columns[number]] for item in run.operators])
-            self._slopes[kind, number] = np.einsum("gcr,grm->gcm", outputs[owner], tangent, optimize=True)
+            self._slopes[kind, number] = channel_changes(run, tracks, forcing, self.columns[number])
         return self._slopes[kind, number]
 
     def read(
@@ -473,17 +478,6 @@ class Predictor:
 
 def _readings(candidates: Sequence[Candidate]) -> list[Reading]:
     return [c.reading for c in candidates if c.reading is not None]
-
-
-@lru_cache(maxsize=65536)
-def run_name(number: int, name: str) -> str | None:
-    """Name of a coordinate in the run of one recording; None if it does not enter."""
-    if name.startswith(FIRST_ORDER):
-        return None
-    if name.startswith(START_PREFIX):
-        owner, _, own = name.removeprefix(START_PREFIX).partition(".")
-        return own if int(owner) == number else None
-    return name.removeprefix(EFFECT_PREFIX)
 
 
 def _acting(candidates: Sequence[Candidate], number: int) -> tuple[tuple[Candidate, ...], set[str]]:

@@ -80,9 +80,12 @@ def _direction(item: Misdescription) -> Coordinate:
 
 
 def _jump(name: str, least: float, most: float) -> Coordinate:
-    """How much earlier an input changed than it is drawn [s]: anywhere from ``least`` to ``most`` alike."""
-    sigma = float(np.sqrt((most**3 - least**3) / (3.0 * (most - least))))
-    return Coordinate(name, 0.0, sigma, False, least / sigma, most / sigma, "s")
+    """How much earlier an input changed than it is drawn [s]: anywhere from ``least`` to ``most`` alike.
+
+    A normal distribution of the same mean and spread within these bounds.
+    """
+    middle, sigma, end = 0.5 * (least + most), (most - least) / np.sqrt(12.0), np.sqrt(3.0)
+    return Coordinate(name, middle, float(sigma), False, -end, end, "s")
 
 
 def start_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:

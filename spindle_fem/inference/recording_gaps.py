@@ -18,6 +18,8 @@ from spindle_fem.inference import tuned
 from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import TransientRun
+from spindle_fem.model.reduced.term_march import Tracks
+from spindle_fem.model.reduced.trbdf2_matrices import build_propagator
 from spindle_fem.recordings.align import GAP_STEPS, Recording
 
 Array = NDArray[np.float64]
@@ -162,6 +164,9 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
 def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, float, float]]) -> Array:
     """Change of the states of a run per second that an input changed earlier, (G, r, n).
 
+    As a mean over half of the longest time that it may have been: bearings that settle within a minute change
+    by far less than their first rate times the time.
+
     Parameters
     ----------
     states : (G + 1, r) ndarray, [K]
@@ -170,11 +175,13 @@ def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, fl
         As :func:`unseen_jumps` gives them.
     """
     forcing = np.zeros((len(run.drive.steps), states.shape[1], len(jumps)))
-    for index, (step, _, _) in enumerate(jumps):
+    for index, (step, _, most) in enumerate(jumps):
         before, after = (int(run.drive.step_class[i]) for i in (step - 1, step))
+        conduction = run.operators[after].conduction
         gained = run.loads[after] @ run.start[step] - run.loads[before] @ run.end[step - 1]
-        gained -= (run.operators[after].conduction - run.operators[before].conduction) @ states[step]
-        forcing[step - 1, :, index] = np.linalg.solve(run.built.storage, gained)
+        gained -= (conduction - run.operators[before].conduction) @ states[step]
+        mean = build_propagator(run.built.storage, conduction, 0.5 * most)
+        forcing[step - 1, :, index] = (mean.from_start + mean.from_end) @ gained / mean.step
     return forcing
 
 
@@ -202,3 +209,21 @@ def hidden_forcing(run: TransientRun, fast: FastModel, hidden: Sequence[Hidden])
             answer = (propagator.from_start + propagator.from_end) @ along[item.what]
             forcing[inside, :, index] = item.size * answer
     return forcing
+
+
+def channel_changes(
+    run: TransientRun, tracks: Tracks | None, forcing: Array, columns: Sequence[int]
+) -> Array:
+    """Change of the channels of a run by changes of its states in each step, (G + 1, c, n) K.
+
+    Parameters
+    ----------
+    tracks : Tracks or None
+        Of the run's terms.
+    forcing : (G, r, n) ndarray, [K]
+    columns : sequence of int
+        Outputs that are the channels.
+    """
+    owner = np.append(run.drive.step_class, run.drive.step_class[-1])
+    outputs = np.array([item.outputs[columns] for item in run.operators])
+    return np.einsum("gcr,grm->gcm", outputs[owner], run.tangents(forcing, tracks), optimize=True)

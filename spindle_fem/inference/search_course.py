@@ -54,8 +54,8 @@ def run_search(search: Search) -> list[Hypothesis]:
         worst = best.score - search.reach(size)
         ranked = [h for h in search.ranked() if len(h.keys) == size and h.score > worst]
         search.progress(f"diagnosis: {size + 1} effects")
-        # What fits within the errors may lack an effect still, which the misfit hides among many readings: what a
-        # further one promises says so. Nothing missing, and a network, whose laws are coarse, are taken as they are.
+        # What fits within the errors may lack an effect still, hidden in the misfit of many readings: what a
+        # further one promises says so. Nothing missing is enough, and in a network, whose laws are coarse.
         enough = search.is_explained(best) and (is_network or not best.keys)
         beam = int(size == 1) if enough else tuned.BEAM
         for hypothesis in to_extend(search, ranked, beam):
