@@ -12,6 +12,9 @@ from spindle_fem.inference.hypothesis import identity
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import Search, Task
 
+# Kind of a candidate that only changes what a channel shows.
+SENSOR = "sensor"
+
 
 def widened(search: Search) -> None:
     """Try the whole set where one of its bearings was found."""
@@ -53,10 +56,12 @@ def exchanged(search: Search) -> None:
     it is tried at other spots, and beside other effects any effect that
     follows a law is tried in its place. Where it follows a recorded quantity it
     is tried at other spots too. To first order the forms of one law hardly differ: the others are tried in
-    its place.
+    its place. Of a machine with geometry a sensor that lies shows what physics near it may do as well: any is
+    tried in its place.
     """
     tasks: list[Task] = []
     own = {effect.name for effect in search.interval_effects}
+    is_spindle = search.view.kind != "network"
     for hypothesis in [h for h in search.ranked() if h.fit.candidates][: tuned.SETS_EXCHANGED]:
         for member in hypothesis.fit.candidates:
             rest = tuple(c for c in hypothesis.fit.candidates if c is not member)
@@ -82,7 +87,8 @@ def exchanged(search: Search) -> None:
                     search,
                     rest,
                     lambda c, places=places, member=member: (
-                        c.component in places and c.effect != member.effect
+                        (c.component in places and c.effect != member.effect)
+                        or (is_spindle and member.kind == SENSOR != c.kind)
                     ),
                 )
     search.fit_all(tasks)

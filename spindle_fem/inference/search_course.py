@@ -55,9 +55,9 @@ def run_search(search: Search) -> list[Hypothesis]:
         ranked = [h for h in search.ranked() if len(h.keys) == size and h.score > worst]
         search.progress(f"diagnosis: {size + 1} effects")
         # What fits within the errors may lack an effect still, hidden in the misfit of many readings: what a
-        # further one promises says so. Nothing missing is enough, and in a network, whose laws are coarse.
-        enough = search.is_explained(best) and (is_network or not best.keys)
-        beam = int(size == 1) if enough else tuned.BEAM
+        # further one promises says so. Beside nothing missing, and in a network, a third one is rare.
+        narrow = int(size == 1 or not (is_network or not best.keys))
+        beam = narrow if search.is_explained(best) else tuned.BEAM
         for hypothesis in to_extend(search, ranked, beam):
             screened, intervals = search.screened(hypothesis.fit)
             search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS)
