@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.model.reduced.reduced_transient import TransientRun
 
 Array = NDArray[np.float64]
@@ -56,3 +59,15 @@ class Prediction:
             inside = self.columns >= 0
             found[:, :, inside] = (places @ self.tangents)[:, :, self.columns[inside]]
         return found
+
+
+def acting_in(candidates: Sequence[Candidate], number: int) -> tuple[tuple[Candidate, ...], set[str]]:
+    """Candidates that act in a recording, and names that belong to the others only."""
+    acting = tuple(c for c in candidates if c.recording in (None, number))
+    idle = {
+        EFFECT_PREFIX + name if name in {f.name for f in c.factors} else name
+        for c in candidates
+        if c.recording not in (None, number)
+        for name in c.parameters
+    }
+    return acting, idle

@@ -18,7 +18,6 @@ from spindle_fem.effects.framework.effect import Candidate, Reading
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.inference.coordinate_names import (
     DIRECTIONS,
-    EFFECT_PREFIX,
     GAP_PREFIX,
     JUMP_PREFIX,
     NO_VALUES,
@@ -29,10 +28,11 @@ from spindle_fem.inference.coordinate_names import (
 from spindle_fem.inference.drive_steps import coarse_drive, even_drive
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.observations import Observation, observe
-from spindle_fem.inference.prediction import Prediction
+from spindle_fem.inference.prediction import Prediction, acting_in
 from spindle_fem.inference.priors import Prior, priors_of
 from spindle_fem.inference.recording_gaps import (
     channel_changes,
+    earlier,
     gap_pieces,
     hidden_forcing,
     hidden_in,
@@ -105,7 +105,7 @@ class Predictor:
             hidden_in(recording, gaps, [group.name for group in fast.spec.bearing_set]) if left_open else ()
             for recording, gaps in zip(self.recordings, self._gaps, strict=True)
         ]
-        self._slopes: dict[tuple[str, int], Array] = {}
+        self._unread: dict[tuple[str, int], Array] = {}
         self._about: tuple[Mapping[str, float], Sequence[Candidate]] = ({}, ())
         self.misdescribed: tuple[Misdescription, ...] = ()
         self.unseen: tuple[Array, ...] = ()
@@ -179,7 +179,7 @@ class Predictor:
         """
         found = copy.copy(self)
         found.misdescribed, found._columns, found._stacked = tuple(directions), dict(columns), {}
-        found._about, found._slopes = about, {}
+        found._about, found._unread = about, {}
         return found
 
     def column_of(self, number: int, coordinate: str) -> Array | None:
@@ -225,22 +225,24 @@ class Predictor:
         """Pieces of the gaps of one recording in which something may have happened, [s]."""
         return self._gaps[number]
 
-    def unread_within(self, number: int, spans: Sequence[tuple[float, float]]) -> dict[str, Array]:
-        """What changed between rows, or in gaps, within stretches of time: its effect on the channels.
+    def unread_within(
+        self, number: int, spans: Sequence[tuple[float, float]], values: Mapping[str, float]
+    ) -> dict[str, tuple[Array, Array]]:
+        """What changed between rows, or in gaps, within stretches of time, by name.
 
         Returns
         -------
-        dict of str to (G + 1, c) ndarray
-            K for each second that an input changed earlier, or for one of what may have happened.
+        dict of str to two (G + 1, c) ndarray
+            Change of the channels by the value [K], and with each unit more.
         """
         grid = self.drives[number].grid
         moments = {JUMP_PREFIX: [float(grid[step]) for step, _, _ in self._jumps[number]]}
         moments[GAP_PREFIX] = [0.5 * (item.begin + item.end) for item in self._hidden[number]]
         return {
-            f"{kind}{number}.{index}": self._slopes_of(kind, number)[:, :, index]
+            name: self._opened(kind, number, index, values.get(name, 0.0))
             for kind, own in moments.items()
             for index, moment in enumerate(own)
-            if any(begin <= moment <= end for begin, end in spans)
+            if (name := f"{kind}{number}.{index}") and any(begin <= moment <= end for begin, end in spans)
         }
 
     def displacements(self) -> tuple[str, ...]:
@@ -289,7 +291,7 @@ class Predictor:
         self, number: int, values: Mapping[str, float], candidates: Sequence[Candidate]
     ) -> tuple[dict[str, float], tuple[Term, ...]]:
         """Factors and term parameters by name, and terms, of one recording's run."""
-        candidates, idle = _acting(candidates, number)
+        candidates, idle = acting_in(candidates, number)
         values = {name: value for name, value in values.items() if name not in idle}
         terms = (*self.effects.terms, *(term for candidate in candidates for term in candidate.terms))
         known = {
@@ -350,7 +352,7 @@ class Predictor:
         Derivatives are to logarithms, to values for parameters that say so.
         ``near`` is a prediction of the recording for values that are near: it begins there.
         """
-        acting, idle = _acting(candidates, number)
+        acting, idle = acting_in(candidates, number)
         values = {name: value for name, value in values.items() if name not in idle}
         # A reading may share a parameter with its term: a bypass that joins before the outlet's sensor.
         shared = {name for c in acting for term in c.terms for name in term.names()}
@@ -414,8 +416,9 @@ class Predictor:
                 continue
             prefix = f"{kind}{number}."
             for name in {name for name in (*values, *derivatives) if name.startswith(prefix)}:
-                slope = self._slopes_of(kind, number)[:, :, int(name.removeprefix(prefix))]
-                predicted.temperature[:] += values.get(name, 0.0) * slope
+                value, index = values.get(name, 0.0), int(name.removeprefix(prefix))
+                change, slope = self._opened(kind, number, index, value)
+                predicted.temperature[:] += change
                 if name in derivatives:
                     predicted.sensitivity[:, :, derivatives.index(name)] += slope
 
@@ -427,9 +430,16 @@ class Predictor:
             self._stacked[number] = known, np.stack(own, axis=2) if own else np.zeros((0, 0, 0))
         return self._stacked[number]
 
-    def _slopes_of(self, kind: str, number: int) -> Array:
-        """Change of the channels (G + 1, c, n): K for each second that an input changed earlier, or K."""
-        if (kind, number) not in self._slopes:
+    def _opened(self, kind: str, number: int, index: int, value: float) -> tuple[Array, Array]:
+        """Change of the channels (G + 1, c) [K] by what gaps and rows leave open, and with each unit more."""
+        columns = self._columns_of(kind, number)
+        if kind == JUMP_PREFIX:
+            return earlier(columns[:, :, index], self._jumps[number][index][2], value)
+        return value * columns[:, :, index], columns[:, :, index]
+
+    def _columns_of(self, kind: str, number: int) -> Array:
+        """Changes of the channels by earlier changes (G + 1, c, n, times), or by one of each event."""
+        if (kind, number) not in self._unread:
             values, candidates = self._about
             run = self.transient(number, values, candidates)
             states, tracks = run.march(self.start(number, values))
@@ -437,8 +447,11 @@ class Predictor:
                 forcing = jump_forcing(run, states, self._jumps[number])
             else:
                 forcing = hidden_forcing(run, self.fast, self._hidden[number])
-            self._slopes[kind, number] = channel_changes(run, tracks, forcing, self.columns[number])
-        return self._slopes[kind, number]
+            found = channel_changes(run, tracks, forcing, self.columns[number])
+            if kind == JUMP_PREFIX:
+                found = found.reshape(*found.shape[:2], len(self._jumps[number]), -1)
+            self._unread[kind, number] = found
+        return self._unread[kind, number]
 
     def read(
         self, number: int, candidates: Sequence[Candidate], values: Mapping[str, float], temperature: Array
@@ -478,15 +491,3 @@ class Predictor:
 
 def _readings(candidates: Sequence[Candidate]) -> list[Reading]:
     return [c.reading for c in candidates if c.reading is not None]
-
-
-def _acting(candidates: Sequence[Candidate], number: int) -> tuple[tuple[Candidate, ...], set[str]]:
-    """Candidates that act in a recording, and names that belong to the others only."""
-    acting = tuple(c for c in candidates if c.recording in (None, number))
-    idle = {
-        EFFECT_PREFIX + name if name in {f.name for f in c.factors} else name
-        for c in candidates
-        if c.recording not in (None, number)
-        for name in c.parameters
-    }
-    return acting, idle

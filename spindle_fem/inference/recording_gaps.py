@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 # Input temperatures, by the name of their load.
 WARMTH = ("ambient", "coolant_inlet")
+# Times that are followed of those that an input may have changed earlier.
+TIMES = 4
 
 
 def gap_pieces(recording: Recording) -> tuple[tuple[float, float], ...]:
@@ -162,10 +164,10 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
 
 
 def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, float, float]]) -> Array:
-    """Change of the states of a run per second that an input changed earlier, (G, r, n).
+    """Change of the states of a run where an input changed earlier than it is drawn, (G, r, n * TIMES) K.
 
-    As a mean over half of the longest time that it may have been: bearings that settle within a minute change
-    by far less than their first rate times the time.
+    By equal parts of the longest time that it may have been, input after input: bearings that settle within a
+    minute change by far less than their first rate times the time.
 
     Parameters
     ----------
@@ -174,15 +176,37 @@ def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, fl
     jumps : sequence of (int, float, float)
         As :func:`unseen_jumps` gives them.
     """
-    forcing = np.zeros((len(run.drive.steps), states.shape[1], len(jumps)))
+    forcing = np.zeros((len(run.drive.steps), states.shape[1], len(jumps), TIMES))
     for index, (step, _, most) in enumerate(jumps):
         before, after = (int(run.drive.step_class[i]) for i in (step - 1, step))
         conduction = run.operators[after].conduction
         gained = run.loads[after] @ run.start[step] - run.loads[before] @ run.end[step - 1]
         gained -= (conduction - run.operators[before].conduction) @ states[step]
-        mean = build_propagator(run.built.storage, conduction, 0.5 * most)
-        forcing[step - 1, :, index] = (mean.from_start + mean.from_end) @ gained / mean.step
-    return forcing
+        one = build_propagator(run.built.storage, conduction, most / TIMES)
+        change = np.zeros(states.shape[1])
+        for part in range(TIMES):
+            change = one.advance @ change + (one.from_start + one.from_end) @ gained
+            forcing[step - 1, :, index, part] = change
+    return forcing.reshape(*forcing.shape[:2], -1)
+
+
+def earlier(changes: Array, most: float, seconds: float) -> tuple[Array, Array]:
+    """Change of the channels [K] where an input changed some seconds earlier, and with each more [K/s].
+
+    Straight between the times that were followed, and on as from the first.
+
+    Parameters
+    ----------
+    changes : (..., TIMES) ndarray, [K]
+        For each of them.
+    most : float, [s]
+        The longest of them.
+    """
+    part = most / TIMES
+    piece = int(np.clip(seconds / part, 0, TIMES - 1))
+    before = changes[..., piece - 1] if piece else np.zeros(changes.shape[:-1])
+    slope = (changes[..., piece] - before) / part
+    return before + (seconds - piece * part) * slope, slope
 
 
 def hidden_forcing(run: TransientRun, fast: FastModel, hidden: Sequence[Hidden]) -> Array:

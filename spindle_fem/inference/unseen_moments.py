@@ -6,9 +6,10 @@ its sizes and laws, not by the guess of a moment that only the held-out readings
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import lsq_linear, minimize_scalar
 
 from spindle_fem.effects.framework.effect import Candidate
@@ -23,6 +24,8 @@ OF_INTERVALS, OF_SENSORS = ("start_", "end_"), ("start", "time")
 TRIED, CLOSENESS = 9, 0.01
 # A moment may lie in a stretch beside it if, at its near end, the readings are this little less likely.
 FLAT = 10.0
+# What an input that changed earlier does is bent over the time: rounds about the values found before.
+ROUNDS = 3
 
 
 def unseen_moments(predictor: Predictor, fit: Fit) -> dict[str, float]:
@@ -48,34 +51,52 @@ def unseen_moments(predictor: Predictor, fit: Fit) -> dict[str, float]:
 def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
     """What inputs did between the rows of held-out stretches, from all readings: values by name.
 
-    To first order, and within the bounds of what rows leave open.
+    Within the bounds of what rows leave open; all else as it was fitted.
     """
-    known = {c.name: (c, u) for c, u in zip(fit.coordinates, fit.position, strict=True)}
+    known = {c.name: c for c in fit.coordinates}
     found: dict[str, float] = {}
     for number, recording in enumerate(predictor.recordings):
         held = stretches(~predictor.use[number], recording.times)
-        slopes = {n: s for n, s in predictor.unread_within(number, held).items() if n in known}
-        if not slopes:
+        values = {
+            name: fit.values[name] for name in predictor.unread_within(number, held, {}) if name in known
+        }
+        if not values:
             continue
         predicted = predictor.predict(number, fit.values, fit.candidates).temperature
-        matrix, rest = [], []
-        for item in (*predictor.observations, *predictor.heldout):
-            # The constant of a displacement is free: temperatures tell.
-            if item.recording == number and not item.bins.is_relative:
-                noise = np.hypot(item.bins.white, fit.slow.sigma)
-                own = np.column_stack([slope[:, item.channel] for slope in slopes.values()])
-                matrix.append(item.at(own) / noise)
-                rest.append((item.values - item.at(predicted[:, item.channel])) / noise)
-        coordinates = [known[name][0] for name in slopes]
-        now = np.array([known[name][1] for name in slopes])
-        columns = np.vstack(matrix) * np.array([c.sigma for c in coordinates])
-        moved = lsq_linear(
-            np.vstack((columns, np.eye(len(now)))),
-            np.concatenate((*rest, np.zeros(len(now)))) + np.concatenate((columns @ now, np.zeros(len(now)))),
-            ([c.low for c in coordinates], [c.high for c in coordinates]),
-        ).x
-        found |= {c.name: c.at(u) for c, u in zip(coordinates, moved, strict=True)}
+        # The constant of a displacement is free: temperatures tell.
+        seen = [
+            (item, np.hypot(item.bins.white, fit.slow.sigma))
+            for item in (*predictor.observations, *predictor.heldout)
+            if item.recording == number and not item.bins.is_relative
+        ]
+        coordinates = [known[name] for name in values]
+        without = predicted - sum(c for c, _ in _opened(predictor, number, held, values))
+        for _ in range(ROUNDS):
+            changes, slopes = zip(*_opened(predictor, number, held, values), strict=True)
+            now = np.array([c.of(v) for c, v in zip(coordinates, values.values(), strict=True)])
+            columns = np.stack([c.sigma * s for c, s in zip(coordinates, slopes, strict=True)], axis=2)
+            own = [item.at(columns[:, item.channel]) / noise for item, noise in seen]
+            rest = [
+                (item.values - item.at((without + sum(changes))[:, item.channel])) / noise
+                for item, noise in seen
+            ]
+            matrix = np.vstack(own)
+            moved = lsq_linear(
+                np.vstack((matrix, np.eye(len(now)))),
+                np.concatenate((np.concatenate(rest) + matrix @ now, np.zeros(len(now)))),
+                ([c.low for c in coordinates], [c.high for c in coordinates]),
+            ).x
+            values = {c.name: c.at(u) for c, u in zip(coordinates, moved, strict=True)}
+        found |= values
     return found
+
+
+def _opened(
+    predictor: Predictor, number: int, held: Sequence[tuple[float, float]], values: Mapping[str, float]
+) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Changes of the channels by the values of what rows of some stretches leave open, and with each unit."""
+    opened = predictor.unread_within(number, held, values)
+    return [opened[name] for name in values]
 
 
 def _beside(held: list[tuple[float, float]], moment: float) -> list[tuple[float, float]]:
