@@ -19,6 +19,7 @@ from spindle_fem.inference.diagnosis import MOST_WORKERS, Diagnosis, diagnose_re
 from spindle_fem.inference.diagnosis_content import diagnosis_content, plain_data, unexplained_content
 from spindle_fem.inference.findings import predictions_at_stamps, states_of
 from spindle_fem.inference.full_model_check import AUTO, OFF, full_model_errors, nothing_run, require_choice
+from spindle_fem.inference.full_model_confirmation import with_confirmation
 from spindle_fem.inference.improved_machine import improved_machine
 from spindle_fem.inference.next_measurement import next_measurement
 from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine, with_growth
@@ -146,6 +147,7 @@ def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
                 ),
                 progress=tell,
             )
+            content = with_confirmation(content)
             content["next_measurement"] = proposed()
         content["wall_time_s"] = time.perf_counter() - started
         replace_text(place / "diagnosis.json", json.dumps(plain_data(content), indent=1) + "\n")

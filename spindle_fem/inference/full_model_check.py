@@ -32,6 +32,7 @@ from spindle_fem.inference.findings import (
     predictions_at_stamps,
     rmse,
 )
+from spindle_fem.inference.full_model_confirmation import left_by_both
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
@@ -140,7 +141,8 @@ def full_model_errors(
         ``mesh`` (as requested or chosen), ``reason`` (why nothing was run, else
         None), and what was run: ``preset``, ``order``, ``unknowns``,
         ``step_error_K``, ``coupling_tolerance_K``, ``before`` and ``after`` (``train_rmse_K``,
-        ``heldout_rmse_K``, ``channels``, ``displacements``, ``steps``, ``seconds``),
+        ``heldout_rmse_K``, ``channels``, ``displacements``, ``steps``, ``seconds``), ``left`` (of
+        the readings over their errors: ``fast`` and ``full``, :func:`left_by_both`),
         ``differences`` (largest difference of full and reduced model at each
         channel: ``before_K``, ``after_K`` and, of what the fits differ by,
         ``change_K``), ``displacement_differences`` (the same in ``_um``, but for
@@ -220,6 +222,7 @@ def _both_fits(
         runs = _one_by_one(prepared, predictor, fits, options, progress)
     found: dict[str, dict[str, Any]] = {}
     apart: dict[str, list[Array]] = {}
+    reduced: dict[str, list[Array]] = {}
     for name, full in runs.items():
         keep(name, full.predicted)
         found[name] = {
@@ -230,8 +233,9 @@ def _both_fits(
             "steps": full.steps,
             "seconds": full.seconds,
         }
-        reduced = predictions_at_stamps(predictor, fits[name])
-        apart[name] = [a - b for a, b in zip(full.predicted, reduced, strict=True)]
+        reduced[name] = predictions_at_stamps(predictor, fits[name])
+        apart[name] = [a - b for a, b in zip(full.predicted, reduced[name], strict=True)]
+    left = left_by_both(predictor, reduced, {name: full.predicted for name, full in runs.items()})
     supplied = any(n.startswith(FIRST_ORDER) for fit in fits.values() for n in fit.values)
     return {
         "mesh": mesh,
@@ -242,6 +246,7 @@ def _both_fits(
         "step_error_K": options.error,
         "coupling_tolerance_K": options.coupling_tolerance,
         **found,
+        "left": dict(zip(("fast", "full"), left, strict=True)),
         "differences": _differences(predictor, apart, "K"),
         "displacement_differences": _differences(predictor, apart, "um"),
         "first_order": FIRST_ORDER_NOTE if supplied else None,

@@ -42,6 +42,11 @@ def _words(found: Mapping[str, Any]) -> str:
         f"{_largest(found['differences'], 'after_K'):.2g} K apart. On what the two fits differ by, both "
         f"models agree within {_largest(found['differences'], 'change_K'):.2g} K."
     )
+    if left := found.get("left"):
+        text += (
+            f" With that change the set leaves {left['full']:.2g} times the errors expected of the readings, "
+            f"{left['fast']:.2g} times on the fast model."
+        )
     # Folders of before have none.
     if moved := found.get("displacement_differences"):
         text += (
