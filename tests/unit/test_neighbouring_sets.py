@@ -16,29 +16,30 @@ from spindle_fem.inference.neighbouring_sets import exchanged
 from spindle_fem.inference.screening import Screened
 
 
-def law(effect: str, component: str, form: str = "") -> Candidate:
+def law(effect: str, component: str, form: str = "", kind: str = "missing_physics") -> Candidate:
     """A law with one amplitude."""
     term = Term()
     term.name = f"{effect}.{component}.{form}"
     term.parameters = (TermParameter("size", 0.0, 1.0, logarithmic=False),)
-    return Candidate(effect, component, form, "missing_physics", f"{term.name}.size", 0.0, 0.5, terms=(term,))
+    return Candidate(effect, component, form, kind, f"{term.name}.size", 0.0, 0.5, terms=(term,))
 
 
 HUMP, RAMP = law("drift", "room", "hump"), law("drift", "room", "ramp")
 BESIDE, ELSEWHERE = law("radiation", "room"), law("radiation", "flange")
+LYING, OTHER_LIE = law("lag", "room", kind="sensor"), law("lag", "flange", kind="sensor")
 
 
 class NotingSearch:
-    """The best set is one hump of the room; every law explains as much to first order."""
+    """The best set is the first of the candidates; every law explains as much to first order."""
 
     interval_effects = ()
-    candidates = (HUMP, RAMP, BESIDE, ELSEWHERE)
     view = SimpleNamespace(kind="machine", groups=(), sets={})
 
-    def __init__(self) -> None:
+    def __init__(self, candidates=(HUMP, RAMP, BESIDE, ELSEWHERE)) -> None:
+        self.candidates = candidates
         nothing = SimpleNamespace(fit=SimpleNamespace(candidates=(), values={}))
-        self.best = SimpleNamespace(fit=SimpleNamespace(candidates=(HUMP,), values={}))
-        self.found = {identity(()): nothing, identity((HUMP,)): self.best}
+        self.best = SimpleNamespace(fit=SimpleNamespace(candidates=candidates[:1], values={}))
+        self.found = {identity(()): nothing, identity(candidates[:1]): self.best}
         count = len(self.candidates)
         screened = Screened(
             tuple(Variant(item, {}) for item in self.candidates),
@@ -73,6 +74,16 @@ def test_other_forms_and_laws_at_its_place_are_tried_in_the_place_of_a_law():
     search = NotingSearch()
     exchanged(search)
     assert search.asked == {identity((RAMP,)), identity((BESIDE,))}
+
+
+@pytest.mark.parametrize(
+    ("kind", "tried"), [("machine", (HUMP, BESIDE, ELSEWHERE)), ("network", (HUMP, BESIDE))]
+)
+def test_physics_anywhere_is_tried_in_the_place_of_a_sensor_that_lies(kind, tried):
+    search = NotingSearch((LYING, OTHER_LIE, HUMP, BESIDE, ELSEWHERE))
+    search.view = SimpleNamespace(kind=kind, groups=(), sets={})
+    exchanged(search)
+    assert search.asked == {identity((candidate,)) for candidate in tried}
 
 
 @pytest.fixture
