@@ -73,8 +73,8 @@ def run_search(search: Search) -> list[Hypothesis]:
 def _beam(search: Search, best: Hypothesis, size: int) -> int:
     """How many sets of a size are extended by one effect more.
 
-    What fits within the errors may lack an effect still, hidden in the misfit of many readings: what
-    a further one promises beside the best set says so. With nothing missing, and in networks, a third is rare.
+    What fits within the errors may lack an effect still, hidden in the misfit of many readings: what a
+    further one promises beside the best set says so. With nothing missing, or in a network, a third is rare.
     """
     if not search.is_explained(best):
         return tuned.BEAM
