@@ -80,12 +80,11 @@ def _direction(item: Misdescription) -> Coordinate:
 
 
 def _jump(name: str, least: float, most: float) -> Coordinate:
-    """How much earlier an input changed than it is drawn [s]: anywhere from ``least`` to ``most`` alike.
+    """How much earlier an input changed than it is drawn [s]: anywhere from ``least`` to ``most``, about alike.
 
-    A normal distribution of the same mean and spread within these bounds.
+    A normal distribution about the middle that ends at one standard deviation.
     """
-    middle, sigma, end = 0.5 * (least + most), (most - least) / np.sqrt(12.0), np.sqrt(3.0)
-    return Coordinate(name, middle, float(sigma), False, -end, end, "s")
+    return Coordinate(name, 0.5 * (least + most), 0.5 * (most - least), False, -1.0, 1.0, "s")
 
 
 def start_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:
