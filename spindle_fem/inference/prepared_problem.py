@@ -80,7 +80,7 @@ def _direction(item: Misdescription) -> Coordinate:
 
 
 def _jump(name: str, least: float, most: float) -> Coordinate:
-    """How much earlier an input changed than it is drawn [s]: anywhere from ``least`` to ``most``, about alike.
+    """How much earlier an input changed than it is drawn [s]: about alike from ``least`` to ``most``.
 
     A normal distribution about the middle that ends at one standard deviation.
     """
