@@ -33,7 +33,7 @@ from spindle_fem.inference.prepared_problem import (
 )
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
-from spindle_fem.inference.state_search import InferredState, inferred_states
+from spindle_fem.inference.state_search import InferredState, inferred_states, states_on_rows
 from spindle_fem.inference.verdict import Judgement, judge, may_stand_for, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
@@ -223,6 +223,11 @@ def diagnose_recordings(
     null = next(h.fit for h in refitted if not h.fit.candidates)
     judgement = with_wrong_definition(judgement, null, wrong)
     progress("diagnosis: where and when")
+    chosen_fit = judgement.chosen.fit
+    followed = readings.followed(chosen_fit)
+    if followed.states and machine.rows:
+        states = states_on_rows(search, final, followed.fit, machine.rows, directions)
+        followed = readings.with_states(chosen_fit, states)
     explanations = []
     about = problem.fit((), null.values)
     patterns = [Pattern(spot, tuple(p for p in own if p in known)) for spot, own in view.spots.items()]
@@ -245,7 +250,7 @@ def diagnose_recordings(
         tried,
         clock.laps,
         wrong,
-        readings.followed(judgement.chosen.fit),
+        followed,
         notes,
     )
 

@@ -79,7 +79,7 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
     if fit is diagnosis.final:
         state = diagnosis.states.get(candidate.amplitude)
         fit, place = diagnosis.stated_fit, fit.candidates.index(candidate)
-        candidate = fit.candidates[place]
+        candidate = fit.candidates[place] if state is None else state.candidate
     parameters = reported_parameters(fit, candidate)
     reported = {name: Reported(item["value"], item["unit"]) for name, item in parameters.items()}
     values = candidate_values(candidate, fit.values)

@@ -129,23 +129,28 @@ class FollowedReadings:
         without it makes up for that: sizes and laws are fitted again, to the same readings as before.
         """
         if id(fit) not in self._followed:
-            states = self._follow(fit)
-            again = fit
-            if states:
-                own = tuple(
-                    states[c.amplitude].candidate if c.amplitude in states else c for c in fit.candidates
-                )
-                again = self._final.fit(own, fit.values, iterations=FOLLOWED_STEPS)
-            moments = unseen_moments(self._plant, again)
-            moments |= unread_changes(self._plant if fit.candidates else self._unchanged, again)
-            if moments:
-                moved = [
-                    c.of(moments[c.name]) if c.name in moments else u
-                    for c, u in zip(again.coordinates, again.position, strict=True)
-                ]
-                again = replace(again, position=np.array(moved))
-            self._followed[id(fit)] = fit, Followed(again, states)
+            self._followed[id(fit)] = fit, self.with_states(fit, self._follow(fit))
         return self._followed[id(fit)][1]
+
+    def with_states(self, fit: Fit, states: Mapping[str, InferredState]) -> Followed:
+        """The fit with these hidden states, and with moments that all readings tell."""
+        again = fit
+        if states:
+            own = [states.get(c.amplitude) for c in fit.candidates]
+            chosen = tuple(
+                c if state is None else state.fitted or state.candidate
+                for c, state in zip(fit.candidates, own, strict=True)
+            )
+            again = self._final.fit(chosen, fit.values, iterations=FOLLOWED_STEPS)
+        moments = unseen_moments(self._plant, again)
+        moments |= unread_changes(self._plant if fit.candidates else self._unchanged, again)
+        if moments:
+            moved = [
+                c.of(moments[c.name]) if c.name in moments else u
+                for c, u in zip(again.coordinates, again.position, strict=True)
+            ]
+            again = replace(again, position=np.array(moved))
+        return Followed(again, states)
 
     def kept(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Sets without those that predict held-out readings worse than some of their effects alone."""

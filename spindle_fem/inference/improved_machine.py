@@ -54,9 +54,11 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     """
     fit = _without_directions(diagnosis) if machine.is_network else diagnosis.stated_fit
     values = fit.values
+    told = {name: state.candidate for name, state in diagnosis.states.items()}
+    candidates = [told.get(item.amplitude, item) for item in fit.candidates]
     entries = tuple(
         EffectEntry.model_validate(definition_entry(item, candidate_values(item, values)))
-        for item in fit.candidates
+        for item in candidates
     )
     own = {
         coordinate.name: (values[coordinate.name], coordinate.sigma)

@@ -35,8 +35,9 @@ from spindle_fem.recordings.thin import thinned_recording
 
 Progress = Callable[[str], None]
 
-# Most stamps of a network's recording, which is stepped from one to the next; more are averaged.
-MOST_STAMPS = 3_000
+# Most stamps of a network's recording, which is stepped from one to the next in every fit, and once where
+# hidden states are followed on its rows; more are averaged.
+MOST_STAMPS, MOST_ROWS = 3_000, 30_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,8 @@ class DiagnosedMachine:
         View of the first recording, its ranges over all.
     recordings, calibration : tuple of Recording
         As they are used: measured inputs smoothed, long ones of networks thinned.
+    rows : tuple of Recording
+        Of a network whose recordings were averaged: those with as many rows as hidden states are followed on.
     notes : tuple of str
         What was done to them.
     unseen : tuple of (n_sources,) ndarray
@@ -68,6 +71,7 @@ class DiagnosedMachine:
     calibration: tuple[Recording, ...]
     notes: tuple[str, ...] = ()
     unseen: tuple[np.ndarray, ...] = ()
+    rows: tuple[Recording, ...] = ()
     too_coarse: Any = None
 
     @property
@@ -134,18 +138,19 @@ def _open_network(
         if name is not None
     }
 
-    def thinned(recording: Recording) -> Recording:
+    def thinned(recording: Recording, most: int) -> Recording:
         count = recording.times.size
-        if count <= MOST_STAMPS:
+        if count <= most:
             return recording
         # Gaps take no stamps: the step follows from the time that was recorded.
         covered = sum(recording.times[end - 1] - recording.times[begin] for begin, end in recording.segments)
-        return thinned_recording(recording, float(covered) / MOST_STAMPS, exponents=exponents)
+        return thinned_recording(recording, float(covered) / most, exponents=exponents)
 
     smooth, notes = _denoised(recordings)
     smooth_earlier, more = _denoised(calibration)
-    own = tuple(thinned(with_changes_amid(item)) for item in smooth)
-    earlier = tuple(thinned(with_changes_amid(item)) for item in smooth_earlier)
+    whole = [with_changes_amid(item) for item in smooth]
+    own = tuple(thinned(item, MOST_STAMPS) for item in whole)
+    earlier = tuple(thinned(with_changes_amid(item), MOST_STAMPS) for item in smooth_earlier)
     averaged = [
         f"{item.name}: {item.times.size} rows averaged to {short.times.size}"
         for item, short in zip((*smooth, *smooth_earlier), (*own, *earlier), strict=True)
@@ -163,6 +168,7 @@ def _open_network(
         earlier,
         (*notes, *more, *averaged),
         tuple(unseen_power(network, item) for item in (*smooth, *smooth_earlier)),
+        tuple(thinned(item, MOST_ROWS) for item in whole) if averaged else (),
     )
 
 

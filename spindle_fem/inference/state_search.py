@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, IntervalEffect
 from spindle_fem.effects.framework.unrecorded import STATES
@@ -27,13 +28,22 @@ from spindle_fem.inference.hidden_states import (
 from spindle_fem.inference.hypothesis import Hypothesis, identity
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem, amplitude_name
 from spindle_fem.inference.hypothesis_search import Search
+from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.missing_heat import Pattern
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.switching_model import QUICK, THOROUGH, Chain, Course, ReadingFilter, find_course
+from spindle_fem.recordings.align import Recording
+
+Array = NDArray[np.float64]
 
 # Shares of the usual size from which courses are looked for.
 START_SIZES = (0.3, 1.5)
 # Fewer intervals than this are single events, whose edges are free.
 FEWEST = 4
+# Width of a state's edges over the steps of a fit, from which means over steps are right to 0.3 %: the
+# error of sums over a logistic function falls with exp(-2 pi² width/step).
+BLUR = 0.3
 # Share of the time on within which an input is zero that makes it its gate, that it exceeds chance by, and
 # from which there is nothing else.
 MOSTLY_INSIDE, TELLS, ONLY = 0.75, 0.1, 0.97
@@ -95,6 +105,8 @@ class InferredState:
         Share of its time for which that input is zero.
     filled : float
         Share of the time for which the input is zero that it is on.
+    fitted : Candidate or None
+        With edges as wide as the steps of a fit need, where its intervals begin and end within those.
     """
 
     candidate: Candidate
@@ -102,6 +114,7 @@ class InferredState:
     gate: str = ""
     inside: float = 0.0
     filled: float = 0.0
+    fitted: Candidate | None = None
 
     @property
     def words(self) -> str:
@@ -116,16 +129,20 @@ class InferredState:
 
 
 def inferred_states(search: Search, problem: Problem, fit: Fit) -> dict[str, InferredState]:
-    """Every hidden state of a fit inferred from all readings, by the name of its amplitude."""
+    """Every hidden state of a fit inferred from all readings, by the name of its amplitude.
+
+    On the steps of the problem, which may be others than those of the search.
+    """
     found = {}
     for candidate in fit.candidates:
         if not search.is_hidden_state(candidate):
             continue
         place, course, _ = search.courses[candidate.amplitude]
+        drive = problem.predictor.drives[place.recording]
+        course = _on_steps(course, search.problem.predictor.drives[place.recording].grid, drive.grid)
         again = course_about(replace(search, problem=problem), fit, place, candidate, course, everything=True)
         if again is None:
             continue
-        drive = problem.predictor.drives[place.recording]
         intervals = intervals_of(again.on, drive.grid)
         middle = 0.5 * (drive.grid[1:] + drive.grid[:-1])
         within = [(middle > start) & (middle < end) for start, end in intervals]
@@ -142,6 +159,34 @@ def inferred_states(search: Search, problem: Problem, fit: Fit) -> dict[str, Inf
             filled = float(on[conditions[best] == 1].sum() / length[conditions[best] == 1].sum())
             state = replace(state, gate=best, inside=inside[best], filled=filled)
         found[candidate.amplitude] = state
+    return found
+
+
+def _on_steps(course: Course, grid: Array, other: Array) -> Course:
+    """A course on other steps, from the ends (T + 1,) of its own and (U + 1,) of those, s."""
+    middle = 0.5 * (other[1:] + other[:-1])
+    row = np.clip(np.searchsorted(grid, middle, side="right") - 1, 0, len(course.on) - 1)
+    return replace(course, on=course.on[row], probability=course.probability[row])
+
+
+def states_on_rows(
+    search: Search, final: Problem, fit: Fit, rows: Sequence[Recording], directions: Sequence[Misdescription]
+) -> dict[str, InferredState]:
+    """Hidden states of a fit to averaged recordings, followed on the recordings' rows.
+
+    What switches within minutes is a mean in bins of many rows. Parameters stay as they were fitted.
+    """
+    averaged = final.predictor
+    plain = Predictor(averaged.fast, rows, effects=averaged.effects).with_unseen(averaged.unseen)
+    fine = with_misdescriptions(plain, directions, fit.values, fit.candidates)
+    problem = Problem(fine, final.belief, final.slow, fine.observations)
+    found = {}
+    for name, state in inferred_states(search, problem, fit).items():
+        place, course, _ = search.courses[name]
+        width = BLUR * float(np.median(np.diff(averaged.drives[place.recording].grid)))
+        intervals = place.effect.intervals(state.candidate, {})
+        own = replace(course, size=state.candidate.reference)
+        found[name] = replace(state, fitted=_candidate(search, place, intervals, own, width))
     return found
 
 
@@ -336,8 +381,12 @@ def _usual(search: Search, place: StatePlace) -> float:
 
 
 def _candidate(
-    search: Search, place: StatePlace, intervals: Sequence[tuple[float, float]], course: Course
+    search: Search,
+    place: StatePlace,
+    intervals: Sequence[tuple[float, float]],
+    course: Course,
+    blurred: float = 0.0,
 ) -> Candidate:
-    found = place.effect.over(search.view, place.pattern.spot, intervals, course=STATES)
+    found = place.effect.over(search.view, place.pattern.spot, intervals, course=STATES, blurred=blurred)
     several = len(search.problem.predictor.recordings) > 1
     return replace(found, reference=max(course.size, 1e-3), recording=place.recording if several else None)

@@ -92,12 +92,20 @@ class InIntervals:
         own; ``STATES``: any number of one size, their edges as they are.
     sizes : sequence of float
         Usual size of every interval beside the common one; 1 where empty.
+    blurred : float, [s]
+        Least width of the edges, of a model whose steps are longer than the intervals.
     """
 
     n_states = 0
     follows = ()
 
-    def __init__(self, intervals: Intervals, course: str = PULSES, sizes: Sequence[float] = ()) -> None:
+    def __init__(
+        self,
+        intervals: Intervals,
+        course: str = PULSES,
+        sizes: Sequence[float] = (),
+        blurred: float = 0.0,
+    ) -> None:
         self._number = len(intervals)
         self._shared = {
             number
@@ -106,7 +114,7 @@ class InIntervals:
         }
         lengths = np.diff([value for _, value in self._named(intervals)])
         shortest = np.min(lengths, where=lengths > TOUCHING, initial=np.inf)
-        self._width = min(EDGE_WIDTH, EDGE_SHARE * float(shortest))
+        self._width = max(blurred, min(EDGE_WIDTH, EDGE_SHARE * float(shortest)))
         if course == STATES:
             edges = [linear(name, value, 0.0, "s") for name, value in self._named(intervals)]
             self.parameters = (shape("lag", self._width, 0.0, "s"), *edges)
@@ -370,10 +378,12 @@ class UnrecordedEffect(IntervalEffect):
         form: str | None = None,
         course: str = PULSES,
         sizes: Sequence[float] = (),
+        blurred: float = 0.0,
     ) -> Candidate:
         """Candidate at a spot that begins from intervals, as :class:`InIntervals` has it."""
         chosen = self.interval_forms[0] if form is None else form
-        return self._candidate(machine, component, InIntervals(tuple(intervals), course, sizes), chosen, None)
+        on = InIntervals(tuple(intervals), course, sizes, blurred)
+        return self._candidate(machine, component, on, chosen, None)
 
     def _candidate(
         self, machine: MachineView, spot: str, on: Share, form: str, quantity: RecordedQuantity | None
