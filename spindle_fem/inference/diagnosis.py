@@ -226,8 +226,11 @@ def diagnose_recordings(
     chosen_fit = judgement.chosen.fit
     followed = readings.followed(chosen_fit)
     if followed.states and machine.rows:
-        states = states_on_rows(search, final, followed.fit, machine.rows, directions)
-        followed = readings.with_states(chosen_fit, states)
+        finer = readings.with_states(
+            chosen_fit, states_on_rows(search, final, followed.fit, machine.rows, directions)
+        )
+        # On rows what a coarse picture leaves may pass for a state that flickers.
+        followed = min(followed, finer, key=readings.left_with)
     explanations = []
     about = problem.fit((), null.values)
     patterns = [Pattern(spot, tuple(p for p in own if p in known)) for spot, own in view.spots.items()]

@@ -99,6 +99,13 @@ class FollowedReadings:
         left = left_over_noise(self._plant, seen, self._predicted_by_all(fit, seen), fit.values)
         return float(np.sqrt(left**2 + self._given_up(fit).left))
 
+    def left_with(self, followed: Followed) -> float:
+        """What these states leave of all readings, held-out ones included, over their noise."""
+        seen = (*self._plant.observations, *self._plant.heldout)
+        predicted = self._predicted(followed.fit)
+        values = [item.at(predicted[item.recording][:, item.channel]) for item in seen]
+        return left_over_noise(self._plant, seen, values, followed.fit.values)
+
     def heldout_misfit(self, fit: Fit) -> float | None:
         """Minus twice the logarithm of their likelihood but for a constant, with the best set's error.
 

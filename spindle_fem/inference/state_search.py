@@ -44,6 +44,8 @@ FEWEST = 4
 # Width of a state's edges over the steps of a fit, from which means over steps are right to 0.3 %: the
 # error of sums over a logistic function falls with exp(-2 pi² width/step).
 BLUR = 0.3
+# Courses side by side and rounds on the rows of a recording, ten times as many as the steps of a fit.
+ON_ROWS = (32, 3)
 # Share of the time on within which an input is zero that makes it its gate, that it exceeds chance by, and
 # from which there is nothing else.
 MOSTLY_INSIDE, TELLS, ONLY = 0.75, 0.1, 0.97
@@ -128,7 +130,9 @@ class InferredState:
         return f" It is on {often} while {self.gate} is zero{always}."
 
 
-def inferred_states(search: Search, problem: Problem, fit: Fit) -> dict[str, InferredState]:
+def inferred_states(
+    search: Search, problem: Problem, fit: Fit, effort: tuple[int, int] = THOROUGH
+) -> dict[str, InferredState]:
     """Every hidden state of a fit inferred from all readings, by the name of its amplitude.
 
     On the steps of the problem, which may be others than those of the search.
@@ -140,7 +144,8 @@ def inferred_states(search: Search, problem: Problem, fit: Fit) -> dict[str, Inf
         place, course, _ = search.courses[candidate.amplitude]
         drive = problem.predictor.drives[place.recording]
         course = _on_steps(course, search.problem.predictor.drives[place.recording].grid, drive.grid)
-        again = course_about(replace(search, problem=problem), fit, place, candidate, course, everything=True)
+        own = replace(search, problem=problem)
+        again = course_about(own, fit, place, candidate, course, everything=True, effort=effort)
         if again is None:
             continue
         intervals = intervals_of(again.on, drive.grid)
@@ -181,7 +186,7 @@ def states_on_rows(
     fine = with_misdescriptions(plain, directions, fit.values, fit.candidates)
     problem = Problem(fine, final.belief, final.slow, fine.observations)
     found = {}
-    for name, state in inferred_states(search, problem, fit).items():
+    for name, state in inferred_states(search, problem, fit, ON_ROWS).items():
         place, course, _ = search.courses[name]
         width = BLUR * float(np.median(np.diff(averaged.drives[place.recording].grid)))
         intervals = place.effect.intervals(state.candidate, {})
@@ -350,6 +355,7 @@ def course_about(
     course: Course,
     *,
     everything: bool = False,
+    effort: tuple[int, int] = THOROUGH,
 ) -> Course | None:
     """The course again, about a fit that holds one already."""
     about = _about(search.problem, fit, place.recording, candidate, everything=everything)
@@ -360,7 +366,7 @@ def course_about(
     size = fit.values[amplitude_name(candidate)] * fit.values.get(candidate.sized_by, 1.0)
     chain = best_chain(base, course.chain, course)
     return find_course(
-        answer_of(base, place.pattern), readings, chain, size, max(2.0 * usual, 2.0 * size), THOROUGH
+        answer_of(base, place.pattern), readings, chain, size, max(2.0 * usual, 2.0 * size), effort
     )
 
 

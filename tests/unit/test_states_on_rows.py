@@ -73,6 +73,8 @@ def test_what_switches_within_a_step_of_the_fit_is_found_on_the_rows(tmp_path, m
     assert score["steps"] < 0.9
     assert score["rows"] > 0.97
     # On the steps of the fit, the same state has the size that it has.
-    followed = FollowedReadings(problem, problem).with_states(fit, states["rows"])
+    readings = FollowedReadings(problem, problem)
+    followed = readings.with_states(fit, states["rows"])
+    assert readings.left_with(followed) < 0.8 * readings.left_with(readings.with_states(fit, states["steps"]))
     (candidate,) = followed.fit.candidates
     assert effect.report(candidate, followed.fit.values)["heat"].value == pytest.approx(SIZE, rel=0.1)
