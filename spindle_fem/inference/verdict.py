@@ -111,8 +111,10 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
     hypotheses : sequence of Hypothesis
         The empty one among them.
     coarseness : float
-        How many times less a gain counts between sizes than on a machine that is drawn.
+        How many times less a gain counts between sizes than on a machine that is drawn; between sets of one
+        size, which share some of what a coarse model leaves, its square root.
     """
+    in_a_size = tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness))
     null = next(h for h in hypotheses if not h.fit.candidates)
     gains = [0.5 * (1.0 - h.course_share) * (null.misfit - h.misfit) for h in hypotheses]
     # Within a size; the best set of a size is then compared with other sizes.
@@ -122,7 +124,7 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
             + h.fit.log_evidence
             + 0.5 * h.fit.misfit_with_prior
             + any_magnitude(h.fit)
-            + gain / tuned.GAIN_DIVISOR_IN_A_SIZE
+            + gain / in_a_size
         )
         for h, gain in zip(hypotheses, gains, strict=True)
     ]
@@ -132,8 +134,7 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
         if size not in best or scores[index] > scores[best[size]]:
             best[size] = index
     less = {
-        size: counted(gains[index]) / (coarseness * tuned.GAIN_DIVISOR)
-        - gains[index] / tuned.GAIN_DIVISOR_IN_A_SIZE
+        size: counted(gains[index]) / (coarseness * tuned.GAIN_DIVISOR) - gains[index] / in_a_size
         for size, index in best.items()
     }
     return [score + less[len(item.fit.candidates)] for item, score in zip(hypotheses, scores, strict=True)]

@@ -2,10 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
+import pytest
+
 from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.effects.framework.unrecorded import InIntervals, UnrecordedHeatTerm
 from spindle_fem.inference import tuned
+from spindle_fem.inference.verdict import rank
 from tests.support.made_hypotheses import OFFSET, PRELOAD, candidate, hypothesis, verdict
 
 
@@ -54,3 +58,13 @@ def test_a_part_that_leaves_too_much_gives_way_to_the_whole_that_leaves_little()
     assert found(0.9, 1.0, null, part, whole) == part.keys
     assert found(1.1, 2.5, null, part, whole) == part.keys
     assert found(1.1, 1.0, null, part, other) == part.keys
+
+
+def test_what_one_set_gains_over_another_of_its_size_counts_less_where_the_model_is_coarse():
+    sets = [hypothesis(misfit=2000.0), hypothesis(PRELOAD, misfit=400.0), hypothesis(OFFSET, misfit=418.0)]
+    odds = []
+    for coarseness in (1.0, 4.0):
+        likely = {item.fit.keys: item.probability for item in rank(sets, coarseness) if item.fit.keys}
+        odds.append(np.log(likely[sets[1].keys] / likely[sets[2].keys]))
+    assert odds[0] == pytest.approx(2.0 * odds[1])
+    assert odds[0] == pytest.approx(9.0 / tuned.GAIN_DIVISOR_IN_A_SIZE)
