@@ -3,7 +3,8 @@
 Every ``STUDY`` is a folder of one of the generators with ``answers`` and ``results``. Writes ``proof.json``
 (the rows of every case, the figures that follow from them, a worked case, real recordings), pictures, and
 ``README.md``, which is rendered from ``proof.json`` alone, so that every number on it is stored there. Real
-recordings, riddles and other programs that are not given again stay as they stand there.
+recordings, riddles and other programs that are not given again stay as they stand there, with ``--keep``
+other studies too.
 """
 
 import argparse
@@ -59,7 +60,6 @@ def read_study(study: Path, results: Path) -> dict[str, Any]:
     drawn = json.loads((study / "study.json").read_text(encoding="utf-8"))
     run = results / "run.json"
     generator = drawn.get("generator", SPINDLE)
-    causes = read_causes(CAUSES, study_seed(study), generator)
     return {
         "name": study.name,
         "title": TITLES[generator],
@@ -69,12 +69,25 @@ def read_study(study: Path, results: Path) -> dict[str, Any]:
         "commit": json.loads(run.read_text(encoding="utf-8"))["commit"] if run.exists() else None,
         "rows": rows,
         **figures_of(rows),
-        "causes": {
-            r["case"]: {k: causes.get(r["case"], {}).get(k, OPEN) for k in ("kind", "cause")}
-            for r in rows
-            if is_wrong(r)
-        },
+        "causes": causes_of(rows, study_seed(study), generator),
     }
+
+
+def causes_of(rows: list[dict[str, Any]], seed: int | None, generator: str) -> dict[str, dict[str, str]]:
+    """Kind and cause of every wrong case, as written down by hand."""
+    causes = read_causes(CAUSES, seed, generator)
+    wrong = [row["case"] for row in rows if is_wrong(row)]
+    return {case: {k: causes.get(case, {}).get(k, OPEN) for k in ("kind", "cause")} for case in wrong}
+
+
+def kept_studies(known: list[dict[str, Any]], given: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Studies of an earlier page that are not given again, with the causes that are known now."""
+    names = {study["name"] for study in given}
+    return [
+        study | {"causes": causes_of(study["rows"], study["seed"], study["generator"])}
+        for study in known
+        if study["name"] not in names
+    ]
 
 
 def figures_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -260,6 +273,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument(
         "--book", type=Path, default=None, help="work folder of the book, with its riddles and peers"
     )
+    parser.add_argument("--keep", action="store_true", help="other studies on the page stay, after these")
     given = parser.parse_args(arguments)
     studies = [(study, study / given.results) for study in given.study]
     data = build(studies, given.worked, (given.real, given.recordings), given.book)
@@ -268,6 +282,8 @@ def main(arguments: list[str] | None = None) -> None:
     if table.exists():
         known = json.loads(table.read_text(encoding="utf-8"))
         data |= {part: known[part] for part in ("riddles", "programs", "real") if not data[part]}
+        if given.keep:
+            data["studies"] += kept_studies(known["studies"], data["studies"])
     from .proof_pictures import draw_all
 
     draw_all(data, {study.name: (study, results) for study, results in studies}, given.output)

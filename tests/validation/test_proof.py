@@ -116,3 +116,14 @@ def test_published_page_is_what_its_data_say():
         assert figures_of(study["rows"]) == {k: study[k] for k in ("summary", "reliability")}
     for picture in re.findall(r"\]\((\S+\.png)\)", page):
         assert (REPORT / picture).exists()
+
+
+def test_studies_that_stay_on_the_page_have_the_causes_that_are_known_now(data, monkeypatch):
+    (study,) = data["studies"]
+    other = study | {"name": "earlier"}
+    cause = {"kind": "twin", "cause": "Both read the same."}
+    monkeypatch.setattr(proof, "read_causes", lambda *ignored: {"case_0002": cause | {"seed": 1}})
+    (kept,) = proof.kept_studies([study, other], [study])
+    assert kept["name"] == "earlier"
+    assert kept["causes"] == {"case_0002": cause}
+    assert kept["rows"] == study["rows"]
