@@ -177,15 +177,19 @@ def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, fl
         As :func:`unseen_jumps` gives them.
     """
     forcing = np.zeros((len(run.drive.steps), states.shape[1], len(jumps), TIMES))
+    parts: dict[tuple[int, float], tuple[Array, Array]] = {}
     for index, (step, _, most) in enumerate(jumps):
         before, after = (int(run.drive.step_class[i]) for i in (step - 1, step))
         conduction = run.operators[after].conduction
         gained = run.loads[after] @ run.start[step] - run.loads[before] @ run.end[step - 1]
         gained -= (conduction - run.operators[before].conduction) @ states[step]
-        one = build_propagator(run.built.storage, conduction, most / TIMES)
+        if (after, most) not in parts:
+            one = build_propagator(run.built.storage, conduction, most / TIMES)
+            parts[after, most] = one.advance, one.from_start + one.from_end
+        advance, answer = parts[after, most]
         change = np.zeros(states.shape[1])
         for part in range(TIMES):
-            change = one.advance @ change + (one.from_start + one.from_end) @ gained
+            change = advance @ change + answer @ gained
             forcing[step - 1, :, index, part] = change
     return forcing.reshape(*forcing.shape[:2], -1)
 
