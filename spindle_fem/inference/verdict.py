@@ -266,16 +266,20 @@ def judge(
     ranked = rank(hypotheses, coarseness)
     p_value = detection_p_value(hypotheses, trials, coarseness)
     empty = next(item for item in ranked if not item.fit.candidates)
+    odds = {item.fit.keys: _log_odds(item, empty) for item in ranked}
     nothing = 0.0
     if p_value <= tuned.SIGNIFICANT:
         nothing = min(empty.probability, tuned.STILL_POSSIBLE) if p_value >= tuned.RULED_OUT else 0.0
         ranked = _without(ranked, empty)
     chosen = ranked[0]
-    improved = _predicts(chosen.best, empty.best, left, beyond, coarseness)
+
+    def predicts(item: Ranked) -> bool:
+        return _predicts(item.best, empty.best, left, beyond, coarseness, odds[item.fit.keys])
+
+    improved = predicts(chosen)
     if chosen.fit.candidates and not improved:
         # What does not tell held-out readings is given up: nothing missing has its probability.
-        kept = [i for i in ranked if i.fit.candidates]
-        kept = [i for i in kept if _predicts(i.best, empty.best, left, beyond, coarseness)]
+        kept = [i for i in ranked if i.fit.candidates and predicts(i)]
         empty = replace(empty, probability=1.0 - sum(i.probability for i in kept))
     if (
         p_value > tuned.SIGNIFICANT
@@ -358,9 +362,12 @@ def _predicts(
     left: Callable[[Fit], float],
     beyond: Callable[[Fit], float],
     coarseness: float,
+    odds: float,
 ) -> bool:
-    """Whether a set predicts held-out readings better than chance.
+    """Whether held-out readings speak for a set: by themselves, or with what the fitted ones say.
 
+    They are a third of the fitted ones, and of a small effect seen by few sensors tell less than its odds by
+    those. What they say against a set counts as well: the sum must be twenty to one.
     A coarse model leaves more than noise, so that likelihoods exaggerate: for a network the residual
     counts, that of fitted readings too, and sensors' white noise hides less of it. If the fit without effects
     leaves only noise, with directions far from their priors, a smaller residual does not count.
@@ -370,7 +377,14 @@ def _predicts(
     if coarseness > 1.0 and max(left(empty.fit), beyond(empty.fit)) > 1.0:
         lower = beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
         return lower and left(chosen.fit) <= left(empty.fit)
-    return 0.5 * (empty.heldout - chosen.heldout) / tuned.GAIN_DIVISOR >= tuned.LEAST_HELDOUT_GAIN
+    gain = 0.5 * (empty.heldout - chosen.heldout) / tuned.GAIN_DIVISOR
+    return max(gain, gain + odds if coarseness == 1.0 else gain) >= tuned.LEAST_HELDOUT_GAIN
+
+
+def _log_odds(item: Ranked, empty: Ranked) -> float:
+    """Logarithm of the odds of a set over nothing missing by fitted readings."""
+    least = np.finfo(float).tiny
+    return float(np.log(max(item.probability, least)) - np.log(max(empty.probability, least)))
 
 
 def unexplained_share(rest: float) -> float:

@@ -184,26 +184,34 @@ def test_a_set_that_does_not_predict_what_was_held_out_is_stated_no_higher_than_
     assert verdict(*sets, **evenly).chosen.probability == verdict(*sets, **fitted).chosen.probability
 
 
-def test_a_set_that_does_not_predict_what_was_held_out_is_not_named():
-    nothing = replace(hypothesis(misfit=2000.0), heldout=700.0)
-    least = 2.0 * tuned.GAIN_DIVISOR * tuned.LEAST_HELDOUT_GAIN
-    better, same = (
-        (replace(hypothesis(PRELOAD, misfit=400.0), heldout=700.0 - gain), nothing)
-        for gain in (least + 0.1, least - 0.1)
-    )
+def test_a_set_is_named_where_fitted_and_held_out_readings_together_speak_for_it():
+    nothing, preload = replace(hypothesis(misfit=2000.0), heldout=700.0), hypothesis(PRELOAD, misfit=1900.0)
+    first, last = rank([nothing, preload])
+    odds = float(np.log(first.probability / last.probability))
+    assert first.fit.candidates
+    assert odds > 2.0 * tuned.LEAST_HELDOUT_GAIN
+    least = 2.0 * tuned.GAIN_DIVISOR * (tuned.LEAST_HELDOUT_GAIN - odds)
+    better, same = ((replace(preload, heldout=700.0 - gain), nothing) for gain in (least + 0.1, least - 0.1))
     assert verdict(*better).verdict == "missing_physics"
     assert verdict(*same).verdict == "consistent"
     assert not verdict(*same).chosen.fit.candidates
+    # held-out readings alone are enough, and in a network needed
+    alone = (
+        replace(preload, heldout=700.0 - 2.0 * tuned.GAIN_DIVISOR * tuned.LEAST_HELDOUT_GAIN - 0.1),
+        nothing,
+    )
+    assert verdict(*alone).verdict == verdict(*alone, coarseness=1.1).verdict == "missing_physics"
+    assert verdict(*better, coarseness=1.1).verdict == "consistent"
     # the picture that a network gives is coarser: what is left of single readings counts
     for share, told in ((0.5, "missing_physics"), (0.99, "consistent")):
         left = {"beyond": lambda fit, share=share: 1.5 * share if fit.candidates else 1.5}
-        assert verdict(*better, coarseness=2.0, **left).verdict == told
+        assert verdict(*alone, coarseness=2.0, **left).verdict == told
     worse = {"left": lambda fit: 1.6 if fit.candidates else 1.5}
     better_later = {"beyond": lambda fit: 0.75 if fit.candidates else 1.5}
-    assert verdict(*better, coarseness=2.0, **better_later, **worse).verdict == "consistent"
+    assert verdict(*alone, coarseness=2.0, **better_later, **worse).verdict == "consistent"
     # less than the noise is no better than the noise
     within = dict.fromkeys(("left", "beyond"), lambda fit: 1.0 if fit.candidates else 0.8)
-    assert verdict(*better, coarseness=2.0, **within).verdict == "missing_physics"
+    assert verdict(*alone, coarseness=2.0, **within).verdict == "missing_physics"
     # where readings leave far more than noise, nothing that is known explains it
     assert verdict(*same, left=lambda fit: 3.0).verdict == "unexplained"
 
