@@ -54,7 +54,9 @@ def run_search(search: Search) -> list[Hypothesis]:
         worst = best.score - search.reach(size)
         ranked = [h for h in search.ranked() if len(h.keys) == size and h.score > worst]
         search.progress(f"diagnosis: {size + 1} effects")
-        for hypothesis in to_extend(search, ranked, _beam(search, best, size)):
+        # A third effect is rare: it is looked for only where two leave something.
+        beam = int(size == 1) if search.is_explained(best) else tuned.BEAM
+        for hypothesis in to_extend(search, ranked, beam):
             screened, intervals = search.screened(hypothesis.fit)
             search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS)
     improve(search)
@@ -68,17 +70,6 @@ def run_search(search: Search) -> list[Hypothesis]:
         # What was found beside a law may explain all that the law did.
         reduced(search)
     return search.ranked()
-
-
-def _beam(search: Search, best: Hypothesis, size: int) -> int:
-    """How many sets of a size are extended by one effect more.
-
-    What fits within the errors may lack an effect still, hidden in the misfit of many readings: what a
-    further one promises beside the best set says so. With nothing missing, or in a network, a third is rare.
-    """
-    if not search.is_explained(best):
-        return tuned.BEAM
-    return int(size == 1 or not (search.problem.predictor.is_network or not best.keys))
 
 
 def _levels_beside(search: Search) -> None:

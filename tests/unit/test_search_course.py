@@ -42,23 +42,3 @@ def test_a_state_that_gains_a_little_every_time_is_not_followed_for_ever(monkeyp
     search = Ever(gain)
     search_course._beside(search)
     assert search.rounds == rounds
-
-
-@pytest.mark.parametrize(
-    ("keys", "size", "is_network", "explained", "beam"),
-    [
-        ({"heat", "seat"}, 2, False, True, 1),
-        ({"heat"}, 1, False, True, 1),
-        (set(), 1, False, True, 1),
-        (set(), 2, False, True, 0),
-        ({"heat", "seat"}, 2, True, True, 0),
-        ({"heat", "seat"}, 2, True, False, tuned.BEAM),
-    ],
-)
-def test_two_effects_that_fit_within_the_errors_may_lack_a_third(keys, size, is_network, explained, beam):
-    predictor = SimpleNamespace(is_network=is_network)
-    search = SimpleNamespace(
-        is_explained=lambda best: explained, problem=SimpleNamespace(predictor=predictor)
-    )
-    best = SimpleNamespace(keys=frozenset(keys))
-    assert search_course._beam(search, best, size) == beam
