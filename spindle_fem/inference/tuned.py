@@ -174,8 +174,9 @@ SMALLEST_SIZE, SEEN_FROM = 0.01, 2.0
 # A set whose error on held-out readings is this many times that of some of its effects alone is given up.
 WORSE_HELDOUT = 1.05
 # Gain in likelihood of held-out readings that a set needs to be named at all, as a gain that counts: twenty
-# to one; of a machine with geometry with its odds by fitted readings. (Six effects of seeds 91, 101 and 171 of
-# generate_rough with p-values below 0.003 gained less held out alone; ten consistent machines have 0.04 and more.)
+# to one; of a machine with geometry with its odds by fitted readings. (Six effects of seeds 91, 101 and 171
+# of generate_rough with p-values below 0.003 gained less held out alone; ten consistent ones have
+# 0.04 and more.)
 LEAST_HELDOUT_GAIN = 3.0
 # Share by which a set of a network must lower the residual of held-out readings over their noise. (Right sets
 # of seed 51 of generate_networks and of the examples lower it by more, false alarms by 1 % and less.)
