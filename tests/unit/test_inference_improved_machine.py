@@ -84,6 +84,7 @@ def found(request, opened, tmp_path_factory):
     fit = problem.fit((candidate,), own)
     outcome = SimpleNamespace(
         stated_fit=fit,
+        states={},
         final=fit,
         predictor=predictor,
         machine_coordinates=calibrated.belief.coordinates,
