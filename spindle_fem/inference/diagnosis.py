@@ -20,6 +20,7 @@ from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.hypothesis_search import Search
+from spindle_fem.inference.like_sets import may_stand_for
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
 from spindle_fem.inference.opened_machine import DiagnosedMachine
@@ -34,7 +35,7 @@ from spindle_fem.inference.prepared_problem import (
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.state_search import InferredState, inferred_states, states_on_rows
-from spindle_fem.inference.verdict import Judgement, judge, may_stand_for, rank, tempered
+from spindle_fem.inference.verdict import Judgement, judge, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
 from spindle_fem.parallel import thread_count

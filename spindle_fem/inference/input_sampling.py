@@ -113,13 +113,17 @@ def left_over_noise(
 def error_over_noise(observations: Sequence[Observation], predicted: Sequence[Array]) -> float:
     """Mean square of residuals of means over bins over the white noise left in them, channels alike.
 
+    Displacements count from a zero of their own.
+
     Parameters
     ----------
-    predicted : sequence of (b,) ndarray, [K]
+    predicted : sequence of (b,) ndarray, [K, µm]
         At the bins of every observation.
     """
-    errors = [
-        np.mean((values - item.values) ** 2) / item.bins.white**2
-        for item, values in zip(observations, predicted, strict=True)
-    ]
+    errors = []
+    for item, values in zip(observations, predicted, strict=True):
+        residual = values - item.values
+        if item.bins.is_relative:
+            residual = residual - residual.mean()
+        errors.append(np.mean(residual**2) / item.bins.white**2)
     return float(np.mean(errors))

@@ -15,6 +15,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, amplitude_name
+from spindle_fem.inference.like_sets import are_alike, free_in_time, holds, may_stand_for
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
 
 Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"]
@@ -24,6 +25,10 @@ NOTHING_REASON = (
     "few recordings without anything missing are like this one, and no set is much likelier than nothing"
 )
 NEAR_REASON = "several sets read the same within the noise; what tells them apart is how exact their laws are"
+CONTRADICTED_REASON = (
+    "chance leaves recordings like this one less than once in a thousand, and no set of effects that makes "
+    "them likelier predicts the readings that were held out"
+)
 # Shift of an uncertain parameter that its prior holds with at least 1 %.
 PRIOR_SIGMAS = float(norm.ppf(0.995))
 
@@ -288,12 +293,17 @@ def judge(
     ):
         nothing_left, misfit_left = left(empty.fit), float(np.sqrt(empty.fit.reduced_misfit))
         much_left = misfit_left > tuned.UNEXPLAINED_MISFIT or nothing_left > tuned.MOST_LEFT
-        if not much_left or (nothing_left <= tuned.MOST_LEFT and within_prior(chosen.fit, calibrated)):
+        in_prior = within_prior(chosen.fit, calibrated)
+        # Where likelihoods hold, readings may contradict the model although no set tells held-out ones.
+        contradicted = coarseness == 1.0 and bool(chosen.fit.candidates) and p_value < tuned.RULED_OUT
+        if not (much_left or contradicted) or (nothing_left <= tuned.MOST_LEFT and in_prior):
             return Judgement("consistent", p_value, empty, (), 0.0, "")
         # The residual is there, and no set of the catalogue makes it likelier.
-        left_over = float(chi2.sf(empty.fit.misfit, len(empty.fit.residual)))
-        much = f"{nothing_left:.1f} times" if nothing_left > tuned.MOST_LEFT else "more than"
-        reason = f"the readings differ from the model by {much} the noise, and no effect explains it"
+        left_over, reason = p_value, CONTRADICTED_REASON
+        if much_left:
+            left_over = float(chi2.sf(empty.fit.misfit, len(empty.fit.residual)))
+            much = f"{nothing_left:.1f} times" if nothing_left > tuned.MOST_LEFT else "more than"
+            reason = f"the readings differ from the model by {much} the noise, and no effect explains it"
         nothing_found = replace(empty, probability=0.0)
         return Judgement("unexplained", left_over, nothing_found, (), 1.0, reason, left=nothing_left)
     misfit = float(np.sqrt(chosen.fit.reduced_misfit))
@@ -311,7 +321,7 @@ def judge(
         and apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
     ]
     # Which bearing of a set it is does not matter for the decision; the best represents all.
-    alike = [item for item in ranked if _alike(item.fit, chosen.fit, known_as_one)]
+    alike = [item for item in ranked if are_alike(item.fit, chosen.fit, known_as_one)]
     evidence = sum(item.probability for item in alike)
     share = share_of_last(hypotheses, chosen.best)
     size = len(chosen.fit.candidates)
@@ -325,7 +335,7 @@ def judge(
         and item not in alike
     )
     # What every likely set holds is sure, whether there is more or not.
-    common = sum(item.probability for item in ranked if _holds(item.fit, chosen.fit, known_as_one))
+    common = sum(item.probability for item in ranked if holds(item.fit, chosen.fit, known_as_one))
     decided = common * (1.0 - nothing) >= tuned.DECIDED and not near
     if decided:
         reason = ""
@@ -397,22 +407,6 @@ def unexplained_share(rest: float) -> float:
     return odds / (1.0 + odds)
 
 
-def may_stand_for(fit: Fit, other: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
-    """Whether a set is an alternative explanation with as many effects as another.
-
-    Effects on in intervals fit much: they can only replace such effects.
-    """
-    return (
-        len(fit.candidates) == len(other.candidates)
-        and not _alike(fit, other, overlapping)
-        and _free_in_time(fit) <= _free_in_time(other)
-    )
-
-
-def _free_in_time(fit: Fit) -> int:
-    return sum(in_intervals(effect_of(c.effect), c) for c in fit.candidates)
-
-
 def _with_needed_events(
     hypotheses: Sequence[Hypothesis], left: Callable[[Fit], float], beyond: Callable[[Fit], float]
 ) -> list[Hypothesis]:
@@ -427,7 +421,7 @@ def _with_needed_events(
         laws = [c for c in item.fit.candidates if not in_intervals(effect_of(c.effect), c)]
         return frozenset((c.effect, c.component) for c in laws)
 
-    plain = [item for item in hypotheses if not _free_in_time(item.fit)]
+    plain = [item for item in hypotheses if not free_in_time(item.fit)]
 
     def needed(item: Hypothesis) -> bool:
         return all(
@@ -438,7 +432,7 @@ def _with_needed_events(
             if other.keys <= only_laws(item)
         )
 
-    return [item for item in hypotheses if not _free_in_time(item.fit) or needed(item)]
+    return [item for item in hypotheses if not free_in_time(item.fit) or needed(item)]
 
 
 def _without_parts(
@@ -466,29 +460,3 @@ def _without(ranked: Sequence[Ranked], empty: Ranked) -> list[Ranked]:
     if not total > 0.0:
         return list(ranked)
     return [Ranked(item.best, item.probability / total) for item in rest]
-
-
-def _alike(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
-    """Whether two sets name the same effects at the same or overlapping places."""
-    return len(fit.candidates) == len(chosen.candidates) and _holds(fit, chosen, overlapping)
-
-
-def _holds(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
-    """Whether a set names every effect of another at the same or an overlapping place."""
-    left = [(c.effect, c.component) for c in chosen.candidates]
-    for candidate in fit.candidates:
-        match = next(
-            (
-                key
-                for key in left
-                if key[0] == candidate.effect
-                and (
-                    key[1] == candidate.component
-                    or candidate.component in overlapping.get(key[1], frozenset())
-                )
-            ),
-            None,
-        )
-        if match is not None:
-            left.remove(match)
-    return not left

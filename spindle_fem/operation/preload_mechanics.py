@@ -1,4 +1,4 @@
-"""Friction of bearing sets over ring difference, fit and speed, by the bearings' own mechanics.
+"""Friction of bearing sets over ring difference, fit, speed and thrust, by the bearings' own mechanics.
 
 What the effect ``thermal_preload`` interpolates: balls, rings and elastic seats solved once for a
 machine, kept on disk.
@@ -35,13 +35,17 @@ from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
 
-FORMAT = "spindle-fem/preload-response/1"
+FORMAT = "spindle-fem/preload-response/2"
+# K; of rings, at which the shaft's part in what they do is taken.
+REFERENCE_DIFFERENCE = 10.0
 # K; denser where balls of one side lose their load and where rings meet the housing.
 DIFFERENCES = (-8.0, -3.0, 0.0, 3.0, 7.0, 12.0, 20.0, 30.0, 45.0)
 # m; from a ring that the housing squeezes hard to one that heavy balls hardly spread to it.
 GAPS = (-25e-6, -15e-6, -8e-6, -3e-6, 0.0, 3e-6, 8e-6, 20e-6)
 # Shares of the highest speed: load decides less of the friction where balls are thrown outwards.
 SPEED_SHARES = (0.05, 0.22, 0.55, 1.0)
+# Shares of the definition's thrust: bearings that a thrust relieves lose what preload adds to it.
+THRUST_SHARES = (0.0, 1.0, 2.0)
 # Points that shape-preserving pieces put between two solved ones: cubic splines through solved points
 # alone swing by a tenth where rings meet the housing.
 PUT_BETWEEN = 2
@@ -51,7 +55,7 @@ HIGHEST_SPEED = 1.5
 LEVEL_OF_TABLES = "full"
 # m
 ON_LINE = 1.0e-9
-# Parts of the housing that move the seats of a set by less than this share are left out.
+# Parts of housing and shaft that move the seats of a set by less than this share are left out.
 LEAST_SHARE = 0.03
 
 
@@ -113,13 +117,16 @@ def _digest(spec: MachineSpec, group: str, places: Collection[str]) -> str:
 
 
 def _solved(spec: MachineSpec, group: BearingSet, places: Collection[str]) -> PreloadResponse:
-    """Solve a set over all differences, gaps and speeds."""
+    """Solve a set over all differences, gaps, speeds and thrusts."""
     bodies = machine_bodies(spec)
     seating = RingSeats(spec, bodies)
     names = [bearing.name for bearing in group.bearing]
-    rows, housing = _rows(spec, bodies, seating, places)
+    rows, shaft, housing = _rows(spec, bodies, seating, places)
     rows = rows[[seating.bearings.index(name) for name in names]]
-    turning, outer, opening = rows[:, :, 0], rows[:, 1, 1], rows[:, 1, 2:].mean(axis=0)
+    ends = np.cumsum([2, len(shaft)])
+    inner_rings, outer = rows[:, :, 0], rows[:, 1, 1]
+    seat, opening = rows[:, 0, 2 : ends[1]].mean(axis=0), rows[:, 1, ends[1] :].mean(axis=0)
+    turning = inner_rings + rows[:, :, 2 : ends[1]].sum(axis=2)
     seats = seating.of_set(names)
     mechanics = BearingMechanics(spec, {group.name: seats})
     level = LEVEL_OF_TABLES if spec.heat.model == "table" else spec.heat.model
@@ -128,31 +135,47 @@ def _solved(spec: MachineSpec, group: BearingSet, places: Collection[str]) -> Pr
         replace(mechanics.options, level=level),
         group,
         turning,
-        mounting.ExternalLoad(
-            spec.axial_load(group, spec.operation.thrust), mechanics.radial_loads[group.name]
-        ),
     )
     table = spec.heat.table
     highest = max(HIGHEST_SPEED * spec.operation.speed, 0.0 if table is None else table.speed[-1])
     speeds = highest * np.array(SPEED_SHARES)
-    friction = [[set_solver.log_friction(gap, speed) for speed in speeds.tolist()] for gap in GAPS]
-    differences, values = _finer(DIFFERENCES, np.array(friction).transpose(2, 0, 1, 3), 0)
+    carries = group.carries_thrust and spec.operation.thrust != 0.0
+    thrusts = np.sort(spec.operation.thrust * np.array(THRUST_SHARES if carries else (1.0,)))
+    radial = mechanics.radial_loads[group.name]
+    loads = [mounting.ExternalLoad(spec.axial_load(group, thrust), radial) for thrust in thrusts.tolist()]
+    friction = [
+        [[set_solver.log_friction(gap, speed, load) for load in loads] for speed in speeds.tolist()]
+        for gap in GAPS
+    ]
+    differences, values = _finer(DIFFERENCES, np.moveaxis(np.array(friction), 3, 0), 0)
     gaps, values = _finer(GAPS, values, 1)
-    share = np.abs(opening) > LEAST_SHARE * np.abs(opening).sum()
-    kept = opening[share] * (opening.sum() / opening[share].sum())
+    alone = replace(set_solver, turning=inner_rings)
+    at = (group.fit.outer_clearance / 2.0, spec.operation.speed, loads[len(loads) // 2])
+    of_rings, of_all = (solver.log_ratio(REFERENCE_DIFFERENCE, *at).mean() for solver in (alone, set_solver))
+    by_shaft = float(1.0 - of_rings / of_all)
     return PreloadResponse(
         tuple(names),
         differences,
         gaps,
         speeds,
+        thrusts,
         values,
         group.fit.outer_clearance,
         _fit_sigma(spec.bearing_types[group.bearing_type].outer_diameter),
         group.assembly_temperature,
         float(-outer.mean()),
-        dict(zip(np.array(housing)[share].tolist(), kept.tolist(), strict=True)),
+        _main_ones(housing, opening, float(opening.sum())),
+        _main_ones(shaft, seat, by_shaft),
         spec.operation.speed,
+        spec.operation.thrust,
     )
+
+
+def _main_ones(places: Sequence[str], shares: Array, total: float) -> dict[str, float]:
+    """Places that have more than ``LEAST_SHARE`` of all, with theirs of a total."""
+    kept = np.abs(shares) > LEAST_SHARE * np.abs(shares).sum()
+    own = shares[kept] * (total / shares[kept].sum())
+    return dict(zip(np.array(places)[kept].tolist(), own.tolist(), strict=True))
 
 
 def _finer(points: Sequence[float], values: Array, axis: int) -> tuple[Array, Array]:
@@ -165,29 +188,31 @@ def _finer(points: Sequence[float], values: Array, axis: int) -> tuple[Array, Ar
 
 def _rows(
     spec: MachineSpec, bodies: MachineBodies, seating: RingSeats, places: Collection[str]
-) -> tuple[Array, list[str]]:
-    """Shifts by a kelvin of shaft and inner rings, outer rings, each place of the housing; these places."""
+) -> tuple[Array, list[str], list[str]]:
+    """Shifts by a kelvin of inner rings, outer rings, each place of shaft and of housing; these places."""
     layout = Layout(spec, set(places))
-    parts = [part for part in spec.part if part.name in bodies.parts[bodies.housing]]
-    found = list(
-        dict.fromkeys(layout.segment_place(part, item.name) for part in parts for item in part.segment)
-    )
+    parts, found = {}, {}
+    for name in (bodies.shaft, bodies.housing):
+        parts[name] = [part for part in spec.part if part.name in bodies.parts[name]]
+        own = [layout.segment_place(part, item.name) for part in parts[name] for item in part.segment]
+        found[name] = list(dict.fromkeys(own))
+    columns = [*found[bodies.shaft], *found[bodies.housing]]
     values = {}
     for name, body in bodies.bodies.items():
         z, r = body.section.mesh.p
-        turning = name == bodies.shaft or name.endswith(".inner_ring")
-        values[name] = np.zeros((z.size, 2 + len(found)))
-        if name != bodies.housing:
-            values[name][:, 0 if turning else 1] = 1.0
+        values[name] = np.zeros((z.size, 2 + len(columns)))
+        if name not in parts:
+            values[name][:, 0 if name.endswith(".inner_ring") else 1] = 1.0
             continue
-        for part in parts:
+        for part in parts[name]:
             for item in part.segment:
                 inside = (z >= item.z[0] - ON_LINE) & (z <= item.z[1] + ON_LINE)
                 inside &= r >= 0.5 * item.inner_diameter - ON_LINE
                 inside &= r <= 0.5 * item.outer_diameter + ON_LINE
-                values[name][inside, 2 + found.index(layout.segment_place(part, item.name))] = 1.0
+                values[name][inside, 2 + columns.index(layout.segment_place(part, item.name))] = 1.0
         values[name] /= values[name].sum(axis=1, keepdims=True)
-    return seating.thermal_rows(*seating.rows_over(values)), found
+    rows = seating.thermal_rows(*seating.rows_over(values))
+    return rows, found[bodies.shaft], found[bodies.housing]
 
 
 def _fit_sigma(diameter: float) -> float:
@@ -205,24 +230,22 @@ class _SetSolver:
     ----------
     turning : (n_bearings, 4) ndarray, [m/K]
         Shifts by a kelvin of shaft and inner rings.
-    load : ExternalLoad
     """
 
     mechanics: BearingMechanics
     options: HeatOptions
     group: BearingSet
     turning: Array
-    load: mounting.ExternalLoad
 
-    def log_friction(self, gap: float, speed: float) -> Array:
+    def log_friction(self, gap: float, speed: float, load: mounting.ExternalLoad) -> Array:
         """Logarithm of the friction at every difference, (n_x, n_bearings).
 
         Differences at which the balls find no equilibrium have the friction of the nearest that has one.
         """
         try:
-            heat = self._heat(DIFFERENCES, gap, speed)
+            heat = self._heat(DIFFERENCES, gap, speed, load)
         except (NoEquilibriumError, OutOfValidityError):
-            heat = np.array([self._alone(difference, gap, speed) for difference in DIFFERENCES])
+            heat = np.array([self._alone(difference, gap, speed, load) for difference in DIFFERENCES])
             known = np.flatnonzero(np.isfinite(heat[:, 0]))
             if not len(known):
                 raise
@@ -230,18 +253,25 @@ class _SetSolver:
             heat = heat[nearest]
         return np.log(heat)
 
-    def _alone(self, difference: float, gap: float, speed: float) -> Array:
+    def log_ratio(self, difference: float, gap: float, speed: float, load: mounting.ExternalLoad) -> Array:
+        """Logarithm of every bearing's friction at a difference over that at none."""
+        none, warm = np.log(self._heat((0.0, difference), gap, speed, load))
+        return warm - none
+
+    def _alone(self, difference: float, gap: float, speed: float, load: mounting.ExternalLoad) -> Array:
         try:
-            return self._heat((difference,), gap, speed)[0]
+            return self._heat((difference,), gap, speed, load)[0]
         except (NoEquilibriumError, OutOfValidityError):
             return np.full(len(self.group.bearing), np.nan)
 
-    def _heat(self, differences: Sequence[float], gap: float, speed: float) -> Array:
+    def _heat(
+        self, differences: Sequence[float], gap: float, speed: float, load: mounting.ExternalLoad
+    ) -> Array:
         mounted = self.mechanics.sets[self.group.name]
         found = solve_states(
             mounted,
             speed,
-            self.load,
+            load,
             [self._temperatures(mounted, difference, gap) for difference in differences],
             lubricant=self.mechanics.lubricants[self.group.name].at(speed),
             control=HEAT_MODELS[self.options.level].ball_attitude,

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 from spindle_fem.inference import tuned
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
 from spindle_fem.inference.verdict import (
+    CONTRADICTED_REASON,
     NEAR_REASON,
     NOTHING_REASON,
     PRIOR_SIGMAS,
@@ -193,7 +194,7 @@ def test_a_set_is_named_where_fitted_and_held_out_readings_together_speak_for_it
     least = 2.0 * tuned.GAIN_DIVISOR * (tuned.LEAST_HELDOUT_GAIN - odds)
     better, same = ((replace(preload, heldout=700.0 - gain), nothing) for gain in (least + 0.1, least - 0.1))
     assert verdict(*better).verdict == "missing_physics"
-    assert verdict(*same).verdict == "consistent"
+    assert verdict(*same).verdict == "unexplained"
     assert not verdict(*same).chosen.fit.candidates
     # held-out readings alone are enough, and in a network needed
     alone = (
@@ -214,6 +215,21 @@ def test_a_set_is_named_where_fitted_and_held_out_readings_together_speak_for_it
     assert verdict(*alone, coarseness=2.0, **within).verdict == "missing_physics"
     # where readings leave far more than noise, nothing that is known explains it
     assert verdict(*same, left=lambda fit: 3.0).verdict == "unexplained"
+
+
+def test_what_chance_does_not_leave_is_unexplained_where_no_set_tells_held_out_readings():
+    nothing = replace(hypothesis(misfit=2000.0), heldout=700.0)
+    clear, faint = (
+        (nothing, replace(hypothesis(PRELOAD, misfit=2000.0 - gain), heldout=900.0)) for gain in (120.0, 24.0)
+    )
+    said = verdict(*clear)
+    assert said.p_value < tuned.RULED_OUT
+    assert (said.verdict, said.reason) == ("unexplained", CONTRADICTED_REASON)
+    assert not said.chosen.fit.candidates
+    assert verdict(*faint).p_value > tuned.RULED_OUT
+    assert verdict(*faint).verdict == "consistent"
+    # likelihoods of a network, a coarse picture, prove less
+    assert verdict(*clear, coarseness=1.1).verdict == "consistent"
 
 
 def test_what_nothing_could_do_by_chance_has_no_probability_left():

@@ -40,7 +40,9 @@ TERMS = {
     "over housing": GapClosureTerm("gap", ("seat",), ("a", "b"), ("c",)),
     "ring by ring": GapClosureTerm("gap", ("seat", "spacer"), ("a", "b"), ("c",), ((0,), (0, 1))),
     "preload": ThermalPreloadTerm("preload", ("A",), ("a",), ("b",)),
-    "mechanics": PreloadMechanicsTerm("mechanics", ("a",), ("b",), set_response(("A",), {"c": 0.9e-6})),
+    "mechanics": PreloadMechanicsTerm(
+        "mechanics", ("a",), ("b",), set_response(("A",), {"c": 0.9e-6}, {"d": 0.4})
+    ),
     "starvation": StarvationTerm("dry", ("A",), "speed", 300.0),
     "bent": Bent(),
 }
@@ -53,7 +55,7 @@ def inputs():
     times = np.concatenate(([0.0], np.cumsum(lengths)))
     speed = np.repeat(random.choice((0.0, 150.0, 290.0), STEPS // 8), 8)
     sensed = 300.0 + np.cumsum(random.normal(0.0, 0.3, (STEPS, 4)), axis=0)
-    return times[:-1], lengths, {"speed": speed}, sensed
+    return times[:-1], lengths, {"speed": speed, "thrust": np.zeros(STEPS)}, sensed
 
 
 def both(term, inputs):

@@ -32,8 +32,11 @@ LOAD_SHARE_SIGMA = 0.5
 # Largest share: friction that follows its load more than this does not come from rings.
 MOST_LOAD_SHARE = 3.0
 # Standard deviation of the logarithm of the exponent of friction over the ring difference, which depends
-# on the state of the grease (load^(2/3..4/3)).
-EXPONENT_SIGMA = 0.12
+# on the state of the grease (load^(2/3..4/3)): of the power law, of what the mechanics has for one state.
+EXPONENT_SIGMA, STATE_SIGMA = 0.12, 0.2
+# Standard deviation of the logarithm of the share of the housing's opening: a seat follows the wall near it
+# and what colder walls and a channel's turns leave of that, while means over parts of the housing are read.
+HOUSING_SIGMA = 0.3
 # Standard deviation of the unevenness within a set: spacers ground to fit share the load otherwise.
 UNEVENNESS_SIGMA = 0.5
 # In standard deviations of the clearance: a fit looser than ordered is likelier than a tighter one, as rings
@@ -79,12 +82,12 @@ class ThermalPreloadTerm(Term):
 class PreloadMechanicsTerm(Term):
     """Friction of every bearing of a set from bearing mechanics, ``1 + a ((m - 1) / m₁₀)^e``.
 
-    ``m`` is friction over that without temperature differences: by the mean ring difference of the set,
-    and by the gap that outer rings, warmer than the housing, close. The differences between the bearings
-    scale with the unevenness: 1 as the mechanics predicts, 0 all equal. ``m₁₀`` is the mean increase at
-    10 K as assembled, so that ``a / m₁₀`` is the share of the friction that follows the load. A set that goes
-    slack loses that share as a power of its friction, which stays above 0. The lag is that of what
-    lies between the places read and the raceways.
+    ``m`` is friction over that without temperature differences at the same speed and thrust: by the mean ring
+    difference of the set, and by the gap that outer rings, warmer than the housing, close. The differences
+    between the bearings scale with the unevenness: 1 as the mechanics predicts, 0 all equal. ``m₁₀`` is the
+    mean increase at 10 K as assembled, so that ``a / m₁₀`` is the share of the friction that follows the
+    load. A set that goes slack loses that share as a power of its friction, which stays above 0. The lag is that of
+    what lies between the places read and the raceways.
     """
 
     n_states = 2
@@ -93,8 +96,8 @@ class PreloadMechanicsTerm(Term):
         self, name: str, inner: tuple[str, ...], outer: tuple[str, ...], response: PreloadResponse
     ) -> None:
         self.name, self.bearings, self.response = name, response.bearings, response
-        self.inner, self.outer = len(inner), len(inner) + len(outer)
-        self.reads = (*inner, *outer, *response.housing)
+        self.ends = np.cumsum([len(inner), len(outer), len(response.shaft)])
+        self.reads = (*inner, *outer, *response.shaft, *response.housing)
         self.increase = response.increase(REFERENCE_DIFFERENCE)
         nominal, sigma = response.clearance, response.clearance_sigma
         low, high = (nominal + side * sigma for side in CLEARANCES)
@@ -102,7 +105,8 @@ class PreloadMechanicsTerm(Term):
             amplitude(NAME, LOAD_SHARE_SIGMA * self.increase, high=MOST_LOAD_SHARE * self.increase),
             linear("outer_clearance", nominal, sigma, "m", low=low, high=high),
             linear("unevenness", 1.0, UNEVENNESS_SIGMA, low=0.0, high=1.0 + 2.0 * UNEVENNESS_SIGMA),
-            shape("exponent_factor", 1.0, EXPONENT_SIGMA, low=0.5, high=2.0),
+            shape("exponent_factor", 1.0, STATE_SIGMA, low=0.5, high=2.0),
+            shape("housing_share", 1.0, HOUSING_SIGMA, low=0.2, high=3.0),
             shape("lag", 200.0, 0.8, "s", low=1.0, high=20000.0),
         )
 
@@ -114,6 +118,7 @@ class PreloadMechanicsTerm(Term):
             context.state[1],
             own["outer_clearance"],
             np.abs(context.inputs["speed"]),
+            context.inputs["thrust"],
         )
         middle = each.mean(axis=0)
         ratio = np.exp(middle + own["unevenness"] * (each - middle))
@@ -122,10 +127,12 @@ class PreloadMechanicsTerm(Term):
         return np.where(ratio.real > 1.0, 1.0 + own[NAME] * loaded, ratio**share)
 
     def advance(self, context: TermContext, step: float) -> Complex:
-        """Ring difference and closing of the fit, lagged, (2, k) K."""
-        read = context.temperatures
-        inner, outer = read[: self.inner].mean(axis=0), read[self.inner : self.outer].mean(axis=0)
-        target = np.array([inner - outer, self.response.closing(outer, read[self.outer :])])
+        """Ring difference, inner rings as the shaft spreads them, and closing of the fit, lagged, (2, k)."""
+        inner, outer, shaft, housing = np.split(context.temperatures, self.ends)
+        outer = outer.mean(axis=0)
+        spreading = self.response.spreading(inner.mean(axis=0), shaft)
+        closing = self.response.closing(outer, housing, context.parameters["housing_share"])
+        target = np.array([spreading - outer, closing])
         return relaxed(context.state, target, step, context.parameters["lag"])
 
 
@@ -152,11 +159,13 @@ class ThermalPreload(Effect):
     card = Card(
         group="Bearings",
         law=(
-            "friction × 1 + a ((m - 1)/m₁₀)^e, m(x, gap of the outer rings, speed) by bearing mechanics, x: "
-            "inner less outer rings of the set, lagged τ; or, as without fits, × 1 + a (w s₊(x/w) / 10 K)^m"
+            "friction × 1 + a ((m - 1)/m₁₀)^e, m(x, gap of the outer rings, speed, thrust) by bearing "
+            "mechanics, x: inner rings, as the shaft spreads them, less outer rings of the set, lagged τ; "
+            "or, as without fits, × 1 + a (w s₊(x/w) / 10 K)^m"
         ),
         size=(
-            "a ± m₁₀/2, clearance ± IT6/3, unevenness 1 ± 0.5, e 1 ×/÷ e^0.12, τ 200 s ×/÷ e^0.8; "
+            "a ± m₁₀/2, clearance ± IT6/3, unevenness 1 ± 0.5, e 1 ×/÷ e^0.2, housing's share 1 ×/÷ e^0.3, "
+            "τ 200 s ×/÷ e^0.8; "
             "without fits a ± 0.25; m 1.45 ×/÷ e^0.12; τ 600 s ×/÷ e^0.4; w 1.5 K ×/÷ e^0.4"
         ),
         acts_on="each bearing set (its bearings share one preload)",

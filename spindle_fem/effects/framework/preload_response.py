@@ -1,8 +1,9 @@
-"""Tables of friction over ring temperatures and fits, computed by bearing mechanics, with interpolation.
+"""Tables of friction over ring temperatures, fits and loads, by bearing mechanics, with interpolation.
 
-Friction depends on three numbers: by how much the inner rings are warmer than the outer ones, the
-gap that temperatures alone leave between outer rings and housing (negative: interference), and the
-speed. Whatever the housing does to the set it does through that gap.
+Friction depends on four numbers: by how much the inner rings are warmer than the outer ones, the
+gap that temperatures alone leave between outer rings and housing (negative: interference), the
+speed, and the thrust, which loads some bearings of a set and relieves others. Whatever the housing does to
+the set it does through that gap.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import NdBSpline, make_interp_spline
 
 Array = NDArray[np.float64]
-CUBIC = 3
+CUBIC, LINEAR = 3, 1
 
 
 @dataclass(frozen=True, eq=False)
 class PreloadResponse:
-    """Friction of the bearings of one set over ring difference, gap of the outer rings and speed.
+    """Friction of the bearings of one set over ring difference, gap of the outer rings, speed and thrust.
 
     Attributes
     ----------
@@ -31,7 +32,9 @@ class PreloadResponse:
     gap : (n_g,) ndarray, [m]
         Radial, of the outer rings in the housing, by temperatures alone.
     speed : (n_n,) ndarray, [rad/s]
-    log_friction : (n_x, n_g, n_n, n_bearings) ndarray
+    thrust : (n_t,) ndarray, [N]
+        A single one where the set carries none.
+    log_friction : (n_x, n_g, n_n, n_t, n_bearings) ndarray
         Logarithm of the friction.
     clearance, clearance_sigma : float, [m]
         Of the outer rings as assembled, on the diameter; how widely the fit's tolerance spreads it.
@@ -40,66 +43,85 @@ class PreloadResponse:
         How far a kelvin of the outer rings closes the gap.
     housing : mapping of place to float, [m/K]
         How far a kelvin of each part of the housing opens it.
+    shaft : mapping of place to float
+        Share of what warm inner rings do that each part of the shaft does, on which they are tight.
     reference_speed : float, [rad/s]
+    reference_thrust : float, [N]
     """
 
     bearings: tuple[str, ...]
     difference: Array
     gap: Array
     speed: Array
+    thrust: Array
     log_friction: Array
     clearance: float
     clearance_sigma: float
     assembly_temperature: float
     outer_ring: float
     housing: Mapping[str, float]
+    shaft: Mapping[str, float]
     reference_speed: float
+    reference_thrust: float
 
     @cached_property
     def _spline(self) -> NdBSpline:
-        """Cubic between the points, over the logarithm of the speed."""
-        axes = (self.difference, self.gap, np.log(self.speed))
+        """Cubic between the points, over the logarithm of the speed; straight over the thrust."""
+        axes, degrees = [self.difference, self.gap, np.log(self.speed)], [CUBIC] * 3
         values, knots = self.log_friction, []
-        for axis, points in enumerate(axes):
-            line = make_interp_spline(points, values, k=CUBIC, axis=axis)
+        if len(self.thrust) > 1:
+            axes, degrees = [*axes, self.thrust], [*degrees, LINEAR]
+        else:
+            values = values[:, :, :, 0]
+        for axis, (points, degree) in enumerate(zip(axes, degrees, strict=True)):
+            line = make_interp_spline(points, values, k=degree, axis=axis)
             # coefficients have the spline's axis first, whichever it went along
             values = np.moveaxis(line.c, 0, axis)
             knots.append(line.t)
-        return NdBSpline(tuple(knots), values, CUBIC)
+        return NdBSpline(tuple(knots), values, tuple(degrees))
 
-    def friction(self, difference: ArrayLike, gap: ArrayLike, speed: ArrayLike) -> NDArray[np.complex128]:
+    def friction(
+        self, difference: ArrayLike, gap: ArrayLike, speed: ArrayLike, thrust: ArrayLike
+    ) -> NDArray[np.complex128]:
         """Logarithm of the friction, (n_bearings, k), with the derivatives that complex steps carry.
 
-        Beyond the points of the mechanics it goes on along its tangent, over the speed it stays.
+        Beyond the points of the mechanics it goes on along its tangent, over speed and thrust it stays.
 
         Parameters
         ----------
         difference, gap : (k,) array_like, [K] and [m]
             May be complex.
-        speed : (k,) array_like, [rad/s]
+        speed, thrust : (k,) array_like, [rad/s] and [N]
         """
-        given = np.broadcast_arrays(np.asarray(difference, complex), np.asarray(gap, complex), speed)
+        given = np.broadcast_arrays(np.asarray(difference, complex), np.asarray(gap, complex), speed, thrust)
         asked = np.array([value.real for value in given], dtype=float)
         # Perturbations of one instant lie side by side and differ in their imaginary parts only.
         fresh = np.append(True, np.any(asked[:, 1:] != asked[:, :-1], axis=0))
         own = np.cumsum(fresh) - 1
         points = asked[:, fresh]
         inside = np.clip(points, self._ends[0], self._ends[1])
-        at = np.stack((inside[0], inside[1], np.log(inside[2])), axis=1)
+        inside[2] = np.log(inside[2])
+        at = inside[: len(self._spline.t)].T
+        rest = (0,) * (at.shape[1] - 2)
         value = self._spline(at)
-        by_difference, by_gap = self._spline(at, nu=(1, 0, 0)), self._spline(at, nu=(0, 1, 0))
+        by_difference, by_gap = self._spline(at, nu=(1, 0, *rest)), self._spline(at, nu=(0, 1, *rest))
         beyond_difference, beyond_gap = (given[axis] - inside[axis][own] for axis in (0, 1))
         found = value[own] + by_difference[own] * beyond_difference[:, None]
         return (found + by_gap[own] * beyond_gap[:, None]).T
 
     @cached_property
     def _ends(self) -> Array:
-        """Ends of the points, (2, 3, 1)."""
-        axes = (self.difference, self.gap, self.speed)
+        """Ends of the points, (2, 4, 1)."""
+        axes = (self.difference, self.gap, self.speed, self.thrust)
         return np.array([[[axis[end]] for axis in axes] for end in (0, -1)])
 
     def log_ratio(
-        self, difference: ArrayLike, closed: ArrayLike, clearance: ArrayLike, speed: ArrayLike
+        self,
+        difference: ArrayLike,
+        closed: ArrayLike,
+        clearance: ArrayLike,
+        speed: ArrayLike,
+        thrust: ArrayLike,
     ) -> NDArray[np.complex128]:
         """Logarithm of every bearing's friction over that without differences, (n_bearings, k).
 
@@ -110,20 +132,32 @@ class PreloadResponse:
             Of the outer rings over the housing, as :meth:`closing` gives it.
         clearance : (k,) array_like, [m]
             As assembled, on the diameter.
+        speed, thrust : (k,) array_like, [rad/s] and [N]
+            The thrust's share in the friction is there without differences, too.
         """
         cold = 0.5 * np.asarray(clearance)
         gap = cold - self.outer_ring * np.asarray(closed)
         still = np.zeros_like(np.asarray(difference, complex))
-        return self.friction(difference, gap, speed) - self.friction(still, cold, speed)
+        return self.friction(difference, gap, speed, thrust) - self.friction(still, cold, speed, thrust)
 
-    def closing(self, outer: NDArray, housing: NDArray) -> NDArray:
-        """Kelvins by which outer rings (k,) close their gap beyond what the housing (n, k) opens it."""
+    def spreading(self, inner: NDArray, shaft: NDArray) -> NDArray:
+        """Kelvins of inner rings and shaft alike that do what these (k,) and parts of the shaft (n, k) do."""
+        shares = np.array(list(self.shaft.values()))
+        return (1.0 - shares.sum()) * inner + shares @ shaft
+
+    def closing(self, outer: NDArray, housing: NDArray, share: ArrayLike = 1.0) -> NDArray:
+        """Kelvins by which outer rings (k,) close their gap beyond what the housing (n, k) opens it.
+
+        ``share`` is how much of its opening by mean temperatures of its parts the housing has.
+        """
         opening = np.array(list(self.housing.values())) / self.outer_ring
-        return outer - self.assembly_temperature - opening @ (housing - self.assembly_temperature)
+        warmer = outer - self.assembly_temperature
+        return warmer - share * (opening @ (housing - self.assembly_temperature))
 
     def increase(self, difference: float) -> float:
-        """Mean increase of the friction at a ring difference (K), nominal clearance, reference speed."""
-        found = self.log_ratio([difference], [0.0], [self.clearance], [self.reference_speed])
+        """Mean increase of the friction at a ring difference (K), nominal clearance, reference point."""
+        at = ([self.reference_speed], [self.reference_thrust])
+        found = self.log_ratio([difference], [0.0], [self.clearance], *at)
         return float(np.exp(found.real).mean() - 1.0)
 
     def exponent(self, difference: float) -> float:
