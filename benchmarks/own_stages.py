@@ -25,6 +25,8 @@ from spindle_fem.model.mesh.step_control import StepControl
 from spindle_fem.model.mesh.thermal_state import uniform_state
 from spindle_fem.model.mesh.time_stepper import integrate
 from spindle_fem.model.reduced.build_reduced import build_reduced_model
+from spindle_fem.model.reduced.mesh_model import build_mesh_model
+from spindle_fem.model.reduced.solving_order import in_solving_order
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.report.run_outputs import write_outputs
 from spindle_fem.results.run_summary import peak_memory_MB
@@ -79,7 +81,7 @@ def measure(machine_name: str, size_factor: float, steps: int, reduced: bool) ->
     solve_machine_network(network, point)
     lap("network, solved")
     if reduced:
-        build_reduced_model(machine)
+        build_reduced_model(machine.spec, in_solving_order(build_mesh_model(machine)))
         lap("reduced model")
     result = solve_prepared(machine)
     lap("checked result")

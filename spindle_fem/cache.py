@@ -167,15 +167,17 @@ def _lock_file(path: Path) -> IO[bytes] | None:
 
 def save_record(record: Any, path: Path, schema: str) -> None:
     """Keep the fields of a dataclass in the cache, arrays and what JSON holds; see :func:`keep_entry`."""
-    arrays: dict[str, NDArray[Any]] = {}
+    save_fields({item.name: getattr(record, item.name) for item in fields(record)}, path, schema)
+
+
+def save_fields(content: Mapping[str, Any], path: Path, schema: str) -> None:
+    """Keep named arrays and what JSON holds in the cache; see :func:`keep_entry`."""
+    arrays = {name: value for name, value in content.items() if isinstance(value, np.ndarray)}
     header: dict[str, Any] = {"schema": schema}
-    for item in fields(record):
-        value = getattr(record, item.name)
-        if isinstance(value, np.ndarray):
-            arrays[item.name] = value
-        else:
-            header[item.name] = dict(value) if isinstance(value, Mapping) else value
-    keep_entry(path, lambda stream: np.savez(stream, header=json.dumps(header), **arrays))
+    for name in content.keys() - arrays.keys():
+        value = content[name]
+        header[name] = dict(value) if isinstance(value, Mapping) else value
+    keep_entry(path, lambda stream: np.savez(stream, header=json.dumps(header, sort_keys=True), **arrays))
 
 
 def load_record(path: Path, schema: str, kind: type) -> dict[str, Any] | None:
@@ -184,6 +186,12 @@ def load_record(path: Path, schema: str, kind: type) -> dict[str, Any] | None:
     None where there is no such file, or it is damaged, of another schema or
     another kind: what it held is made again.
     """
+    found = load_fields(path, schema)
+    return None if found is None or found.keys() != {item.name for item in fields(kind)} else found
+
+
+def load_fields(path: Path, schema: str) -> dict[str, Any] | None:
+    """What :func:`save_fields` wrote, lists as tuples; None as :func:`load_record`."""
     if not path.is_file():
         return None
     try:
@@ -193,7 +201,7 @@ def load_record(path: Path, schema: str, kind: type) -> dict[str, Any] | None:
         known = header.pop("schema", None) == schema
     except (*DAMAGED, AttributeError):
         return None
-    if not known or header.keys() | arrays.keys() != {item.name for item in fields(kind)}:
+    if not known or header.keys() & arrays.keys():
         return None
     return {
         name: tuple(value) if isinstance(value, list) else value for name, value in header.items()

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from spindle_fem.cache import load_record, save_record
+from spindle_fem.model.matrices_on_pattern import MatricesOnPattern, sum_of
 
 Array = NDArray[np.float64]
 Matrix = Array | sparse.csr_array
@@ -142,7 +143,8 @@ class ThermalModel:
         total = _weighted(self.operators, values, self.size)
         if not len(self.cell_film):
             return total
-        return total + _weighted(self.cell_film, np.ravel(channel_film), self.size)
+        films = _weighted(self.cell_film, np.ravel(channel_film), self.size)
+        return sum_of(total, films) if sparse.issparse(total) else total + films
 
     def capacity(self, volumetric: Mapping[str, float]) -> Matrix:
         """``Σ m_i M_i``, (n, n) [J/K]."""
@@ -237,6 +239,8 @@ def _weighted(matrices: Matrices, weights: Sequence[float] | Array, size: int) -
     """Weighted sum; of sparse matrices by one concatenation, cheaper than adding one after the other."""
     if isinstance(matrices, np.ndarray):
         return np.tensordot(weights, matrices, axes=1) if len(matrices) else np.zeros((size, size))
+    if isinstance(matrices, MatricesOnPattern):
+        return matrices.weighted(weights)
     rows, columns, values = [], [], []
     for matrix, weight in zip(matrices, weights, strict=True):
         if weight != 0.0:

@@ -1,7 +1,10 @@
 """A projection that grows where its own residual asks, on a coarse linear mesh."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
+from scipy import sparse
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
@@ -14,11 +17,13 @@ from spindle_fem.model.reduced.build_reduced import (
     build_reduced_model,
     physical_loads,
 )
-from spindle_fem.model.reduced.growing_projection import GrowingProjection, in_solving_order
+from spindle_fem.model.reduced.growing_projection import GrowingProjection
+from spindle_fem.model.reduced.kept_operators import keep_operators, kept_operators, operators_path
 from spindle_fem.model.reduced.mesh_model import build_mesh_model
 from spindle_fem.model.reduced.reduced_cache import KeptBasis, family_of, reduced_digest, reduced_path
+from spindle_fem.model.reduced.solving_order import in_solving_order
+from spindle_fem.model.thermal_model import MATRIX_FIELDS
 from spindle_fem.operation.coefficient_table import build_coefficient_table, free_parameters
-from spindle_fem.solvers.prepared_machine import machine_on_mesh
 
 SHIFTS = (0.0, 1.0e-3)
 
@@ -33,7 +38,7 @@ def models(small):
 def samples(small, models):
     full = models[1]
     table = build_coefficient_table(small.spec, full.contacts, full.gap_radii)
-    sampler = _Sampler(small, full, table, free_parameters(small.spec), ReductionOptions())
+    sampler = _Sampler(small.spec, full, table, free_parameters(small.spec), ReductionOptions())
     return sampler.sample({}, sampler.usual_speed), *sampler.random_samples(2, 5, 2.0)
 
 
@@ -106,12 +111,12 @@ def test_what_a_basis_misses_is_what_the_full_model_adds(small, models, samples)
         assert full.probes @ found == pytest.approx(expected, abs=0.05 * np.abs(expected).max())
 
 
-def test_a_machine_with_other_coefficients_begins_from_a_kept_basis(small, small_fast):
+def test_a_machine_with_other_coefficients_begins_from_a_kept_basis(small, small_fast, models):
     kept = KeptBasis.beside(reduced_path(small_fast.model.digest))
     assert kept.mesh == small.mesh.digest
     near = Reduction(small_fast.model, kept.fields)
     calibrated = with_parameters(small.spec, {"film.outside": 1.3, "joint.rear_outer_ring_seats": 0.7})
-    same = build_reduced_model(machine_on_mesh(calibrated, small.mesh, small.operators), near=near)
+    same = build_reduced_model(calibrated, models[1], near=near)
     assert same.fields is kept.fields
     assert same.model.operators is near.model.operators
     assert same.model.ranges["film.housing.outside"][1] > 1.25 * near.model.ranges["film.housing.outside"][1]
@@ -120,13 +125,13 @@ def test_a_machine_with_other_coefficients_begins_from_a_kept_basis(small, small
 
 
 @pytest.mark.slow
-def test_a_kept_basis_grows_where_the_check_asks(small, small_fast):
+def test_a_kept_basis_grows_where_the_check_asks(small, small_fast, models):
     kept = KeptBasis.beside(reduced_path(small_fast.model.digest))
     near = Reduction(small_fast.model, kept.fields)
     iron = small.spec.materials["cast_iron"]
     other_iron = iron.model_copy(update={"thermal_conductivity": 1.3 * iron.thermal_conductivity})
     other = small.spec.model_copy(update={"materials": small.spec.materials | {"cast_iron": other_iron}})
-    grown = build_reduced_model(machine_on_mesh(other, small.mesh, small.operators), near=near)
+    grown = build_reduced_model(other, models[1], near=near)
     assert near.model.size < grown.model.size < 2 * near.model.size
     assert grown.fields[:, : near.model.size] == pytest.approx(kept.fields, abs=0.0)
     assert grown.model.errors["probes"] <= ReductionOptions().error
@@ -144,3 +149,23 @@ def test_what_is_set_belongs_to_the_family_unless_it_is_geometry(small):
     moved = load_machine("recorded_spindle", ["mesh.preset=coarse", "mesh.order=1", "channel.depth=9 mm"])
     assert family(moved) != own
     assert family_of(reduced_digest(moved, {})) == []
+
+
+def test_operators_come_back_from_the_cache_as_they_were(models, monkeypatch, tmp_path):
+    monkeypatch.setenv("SPINDLE_FEM_CACHE", str(tmp_path))
+    full = models[1]
+    assert kept_operators("family-own") is None
+    keep_operators(full, "family-own")
+    again = kept_operators("family-other")
+    for item in fields(full):
+        given, found = getattr(full, item.name), getattr(again, item.name)
+        if item.name in MATRIX_FIELDS:
+            assert len(given) == len(found)
+            assert all(abs(one - two).max() == 0.0 for one, two in zip(given, found, strict=True))
+        elif sparse.issparse(given):
+            assert given.shape == found.shape
+            assert abs(given - found).max() == 0.0
+        else:
+            assert np.array_equal(given, found), item.name
+    operators_path("family").write_bytes(operators_path("family").read_bytes()[:-2000])
+    assert kept_operators("family-own") is None

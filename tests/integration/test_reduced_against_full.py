@@ -200,14 +200,18 @@ def test_it_follows_the_full_transient_within_a_fiftieth_of_a_kelvin(machine, fa
 
 def test_it_is_found_again_in_the_cache(machine, fast, monkeypatch, tmp_path):
     monkeypatch.setenv("SPINDLE_FEM_CACHE", str(tmp_path))
-    made = []
+    made, meshed = [], []
 
-    def build(prepared, options, **more):
-        made.append(prepared.spec)
-        model = replace(fast.model, digest=building.reduced_digest(prepared.spec, options.key(prepared.spec)))
+    def build(spec, full, options, **more):
+        made.append(spec)
+        model = replace(fast.model, digest=building.reduced_digest(spec, options.key(spec)))
         return building.Reduction(model, np.zeros((2, 1), dtype=np.float32))
 
-    monkeypatch.setattr(building, "prepare_machine", lambda spec, **more: replace(machine, spec=spec))
+    def prepare(spec, **more):
+        meshed.append(spec)
+        return replace(machine, spec=spec)
+
+    monkeypatch.setattr(building, "prepare_machine", prepare)
     monkeypatch.setattr(building, "build_reduced_model", build)
     spec, options = machine.spec, ReductionOptions()
     first, again = reduced_model_of(spec), reduced_model_of(spec)
@@ -220,6 +224,8 @@ def test_it_is_found_again_in_the_cache(machine, fast, monkeypatch, tmp_path):
     assert reduced_model_of(far, as_given=True).digest != first.digest
     assert reduced_model_of(near).digest != first.digest
     assert made == [spec, far, near]
+    # the operators of the family are kept too, but for those of one whose geometry differs
+    assert meshed == [spec]
     assert reduced_model_of(spec, options=replace(options, tolerance=1e-2)).digest != first.digest
 
 

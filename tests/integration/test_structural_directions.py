@@ -102,7 +102,7 @@ def test_columns_are_those_of_a_machine_that_really_differs(name, made, full, di
     direction = next(item for item in directions if item.name == name)
     spec, point = small.spec, OperatingPoint.of(small.spec)
     table = build_coefficient_table(spec, full.model.contacts, full.model.gap_radii)
-    sample = Sample(table.base(point), nominal_channel_film(small, point), table.capacities())
+    sample = Sample(table.base(point), nominal_channel_film(spec, full.model, point), table.capacities())
 
     def readings(of, solve):
         matrix = of.conduction(sample.coefficients, sample.channel_film)

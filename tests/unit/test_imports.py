@@ -37,6 +37,7 @@ FLOORS = (
     "effects.registry",
     "machine.view",
     "model.trbdf2",
+    "model.matrices_on_pattern",
     "model.thermal_model",
     "model.mesh",
     "model.elastic",

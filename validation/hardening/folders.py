@@ -142,7 +142,8 @@ def _try_cache(record: Record, chance: random.Random, folder: Path, originals: P
         record.step("model", run_function(lambda: _read_again(file, sound, load, names), folder))
         return
     # the mesh is read only where the model is not there
-    file = next(path for path in cache.glob("*.npz") if path not in (model, basis))
+    of_model = ("reduced", "basis", "operators")
+    file = next(path for path in cache.glob("*.npz") if path.name.partition("-")[0] not in of_model)
     record.done = ["mesh", _spoil_entry(chance, file)]
     around = Surroundings({"SPINDLE_FEM_CACHE": str(cache)})
     if record.step("mesh", run_command(list(MESH), folder, around)) == ACCEPTED:

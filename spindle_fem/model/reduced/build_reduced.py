@@ -13,13 +13,22 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.machine.view.place_names import ACROSS, AROUND, NEAR, UP
-from spindle_fem.model.reduced.growing_projection import GrowingProjection, in_solving_order
+from spindle_fem.model.reduced.growing_projection import GrowingProjection
+from spindle_fem.model.reduced.kept_operators import keep_operators, kept_operators
 from spindle_fem.model.reduced.mesh_model import MeshModel, build_mesh_model
-from spindle_fem.model.reduced.reduced_cache import KeptBasis, family_of, reduced_digest, reduced_path
+from spindle_fem.model.reduced.reduced_cache import (
+    KeptBasis,
+    basis_path,
+    family_of,
+    reduced_digest,
+    reduced_path,
+)
 from spindle_fem.model.reduced.snapshots import Sample
+from spindle_fem.model.reduced.solving_order import in_solving_order
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.model.reduced.unit_loads import coolant_loads, fluid_loads, friction_loads
 from spindle_fem.model.thermal_model import ThermalModel, project
+from spindle_fem.operation.channel_cells import cells_of_model
 from spindle_fem.operation.coefficient_table import (
     CoefficientTable,
     build_coefficient_table,
@@ -27,7 +36,7 @@ from spindle_fem.operation.coefficient_table import (
 )
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
+from spindle_fem.solvers.prepared_machine import prepare_machine
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -109,7 +118,7 @@ SPEED_SHARES = (0.0, 2.0 / 3.0, 0.25, 1.0, 0.45)
 class _Sampler:
     """Draws sets of coefficients over the range of a machine's uncertain parameters and speeds."""
 
-    machine: PreparedMachine
+    spec: MachineSpec
     full: MeshModel
     table: CoefficientTable
     sigma: Mapping[str, float]
@@ -118,12 +127,11 @@ class _Sampler:
     @property
     def usual_speed(self) -> float:
         """Speed of the nominal coefficients, rad/s."""
-        return SPEED_SHARES[1] * self.options.highest_speed_of(self.machine.spec)
+        return SPEED_SHARES[1] * self.options.highest_speed_of(self.spec)
 
     def sample(self, factors: Mapping[str, float], speed: float) -> Sample:
         """Coefficients with factors at a speed."""
-        spec = self.machine.spec
-        point = replace(OperatingPoint.of(spec), speed=speed)
+        point = replace(OperatingPoint.of(self.spec), speed=speed)
         chosen = self.table.factors(factors)
         chosen.pop("heat.inner_share", None)
         base = self.table.base(point)
@@ -133,13 +141,13 @@ class _Sampler:
         capacities = {
             name: value * self.table.scale(name, chosen) for name, value in self.table.capacities().items()
         }
-        film = nominal_channel_film(self.machine, point) * self.table.scale(CHANNEL_FILM, chosen)
+        film = nominal_channel_film(self.spec, self.full, point) * self.table.scale(CHANNEL_FILM, chosen)
         return Sample(coefficients, film, capacities)
 
     def random_samples(self, number: int, seed: int, sigmas: float) -> list[Sample]:
         """Latin hypercube over all parameters; the speeds take turns."""
         names = tuple(self.sigma)
-        highest = self.options.highest_speed_of(self.machine.spec)
+        highest = self.options.highest_speed_of(self.spec)
         unit = qmc.LatinHypercube(max(1, len(names)), rng=seed).random(number)
         found = []
         for row, values in enumerate(unit):
@@ -153,7 +161,7 @@ class _Sampler:
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Lowest and highest coefficient that the samples may have."""
         ends = []
-        highest = self.options.highest_speed_of(self.machine.spec)
+        highest = self.options.highest_speed_of(self.spec)
         for share in SPEED_SHARES:
             for sign in (-1.0, 1.0):
                 factors = {
@@ -168,13 +176,12 @@ class _Sampler:
         return {name: (min(e[name] for e in ends), max(e[name] for e in ends)) for name in ends[0]}
 
 
-def nominal_channel_film(machine: PreparedMachine, point: OperatingPoint) -> Array:
+def nominal_channel_film(spec: MachineSpec, full: MeshModel, point: OperatingPoint) -> Array:
     """Film of every coolant cell with the wall at inlet temperature, (n_cells,) W/(m²·K)."""
-    cells = machine.builder.cells
-    if cells is None:
+    if not full.cell_area.size:
         return np.zeros(0)
-    wall = np.full(cells.cell_area.shape, point.coolant_inlet_temperature)
-    return CoolantLoop(machine.spec, cells).at(point, wall).film_coefficient.ravel()
+    wall = np.full(full.cell_area.shape, point.coolant_inlet_temperature)
+    return CoolantLoop(spec, cells_of_model(full)).at(point, wall).film_coefficient.ravel()
 
 
 def reduced_model_of(
@@ -204,20 +211,27 @@ def reduced_model_of(
         found = ThermalModel.load(path)
         if found is not None and _holds(found, spec, chosen.highest_speed_of(spec)):
             return found
-    machine = prepare_machine(spec, progress=progress)
-    near = _nearest(digest, machine)
-    built = build_reduced_model(machine, chosen, near=near, progress=progress)
+    full = kept_operators(digest)
+    if full is None:
+        machine = prepare_machine(spec, progress=progress)
+        progress("reduced model: operators")
+        full = in_solving_order(build_mesh_model(machine))
+        del machine
+        keep_operators(full, digest)
+    near = _nearest(digest, full)
+    built = build_reduced_model(spec, full, chosen, near=near, progress=progress)
     built.model.save(reduced_path(digest))
     if near is None or built.fields is not near.fields:
-        KeptBasis(machine.mesh.digest, built.fields).save(digest)
+        KeptBasis(full.mesh_digest, built.fields).save(digest)
     return built.model
 
 
-def _nearest(digest: str, machine: PreparedMachine) -> Reduction | None:
+def _nearest(digest: str, full: MeshModel) -> Reduction | None:
     """The smallest reduction of another machine of the family on the same mesh; None where none is kept."""
-    for path in sorted(family_of(digest), key=lambda path: path.stat().st_size):
+    with_basis = [path for path in family_of(digest) if basis_path(path).is_file()]
+    for path in sorted(with_basis, key=lambda path: path.stat().st_size):
         model, basis = ThermalModel.load(path), KeptBasis.beside(path)
-        if model is not None and basis is not None and basis.mesh == machine.mesh.digest:
+        if model is not None and basis is not None and basis.mesh == full.mesh_digest:
             return Reduction(model, basis.fields)
     return None
 
@@ -233,13 +247,14 @@ def _holds(model: ThermalModel, spec: MachineSpec, highest_speed: float) -> bool
 
 
 def build_reduced_model(
-    machine: PreparedMachine,
+    spec: MachineSpec,
+    full: MeshModel,
     options: ReductionOptions | None = None,
     *,
     near: Reduction | None = None,
     progress: Progress = lambda stage: None,
 ) -> Reduction:
-    """Project a prepared machine and check the projection against the full model.
+    """Project a machine's mesh model and check the projection against it.
 
     Snapshots are full solutions at several Laplace frequencies (moment
     matching, rational Krylov) for every source and fluid at the nominal
@@ -252,6 +267,8 @@ def build_reduced_model(
 
     Parameters
     ----------
+    full : MeshModel
+        In solving order.
     near : Reduction, optional
         Of a machine on the same mesh with other coefficients: its basis takes the place of the
         snapshots, and what two rounds of checks ask for is added to it.
@@ -262,16 +279,14 @@ def build_reduced_model(
         The checks still err after ``ROUNDS`` with snapshots.
     """
     chosen = options or ReductionOptions()
-    spec = machine.spec
-    progress("reduced model: operators")
-    full = in_solving_order(build_mesh_model(machine))
     table = build_coefficient_table(spec, full.contacts, full.gap_radii)
-    sampler = _Sampler(machine, full, table, free_parameters(spec), chosen)
+    sampler = _Sampler(spec, full, table, free_parameters(spec), chosen)
     nominal = sampler.sample({}, sampler.usual_speed)
     grown = GrowingProjection(full, nominal, None if near is None else (near.fields, near.model))
-    wanted = SOLUTION_ERROR * grown.size_of(nominal, physical_loads(full, nominal, spec))
+    wanted = None
     if near is None:
         progress("reduced model: snapshots")
+        wanted = _wanted(grown, nominal, spec)
         _add_snapshots(grown, sampler, nominal, wanted)
     seed = 2
     for attempt in range(ROUNDS if near is None else ROUNDS + ROUNDS_OF_NEAR):
@@ -295,6 +310,7 @@ def build_reduced_model(
             worst = {key: max(value, errors[key]) for key, value in worst.items()}
             if errors["probes"] > chosen.error:
                 # What was good enough in the energy norm was not at the probes of this machine.
+                wanted = _wanted(grown, nominal, spec) if wanted is None else wanted
                 grown.enrich(sample, loads, SHIFTS, wanted * chosen.error / errors["probes"])
         seed += 100
         if worst["probes"] <= chosen.error:
@@ -312,9 +328,14 @@ def build_reduced_model(
     )
 
 
+def _wanted(grown: GrowingProjection, nominal: Sample, spec: MachineSpec) -> float:
+    """Error in the energy norm of a solution from which a basis is made."""
+    return SOLUTION_ERROR * grown.size_of(nominal, physical_loads(grown.full, nominal, spec))
+
+
 def _add_snapshots(grown: GrowingProjection, sampler: _Sampler, nominal: Sample, wanted: float) -> None:
     """Sources one by one at the nominal coefficients, then physical loads over the range."""
-    spec, chosen = sampler.machine.spec, sampler.options
+    spec, chosen = sampler.spec, sampler.options
     _add_nominal(grown, nominal, spec, wanted)
     opened = [sampler.sample({f"joint.{group.name}": OPENED}, sampler.usual_speed) for group in spec.joint]
     for sample in (*opened, *sampler.random_samples(chosen.samples, 1, chosen.sigmas)):

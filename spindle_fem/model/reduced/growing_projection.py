@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import cholesky, eigh, solve_triangular
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from spindle_fem.model.matrices_on_pattern import sum_of
 from spindle_fem.model.mesh.column_solver import COLUMNS_AT_ONCE, corrections, dots, product_of
 from spindle_fem.model.mesh.huge_pages import room
 from spindle_fem.model.mesh.linear_solvers import Preconditioner, build_preconditioner
@@ -107,7 +107,7 @@ class GrowingProjection:
     Attributes
     ----------
     full : MeshModel
-        Its unknowns in any order; :func:`in_solving_order` has the one in which products are fastest.
+        Its unknowns in any order; products are fastest in that of ``solving_order``.
     sample : Sample
         Coefficients of the energy in which solutions are compared.
     known : tuple of (n, d) float32 ndarray and ThermalModel, optional
@@ -119,27 +119,22 @@ class GrowingProjection:
     sample: Sample
     known: InitVar[tuple[NDArray[np.float32], ThermalModel] | None] = None
     size: int = field(init=False, default=0)
-    _energy: sparse.csr_array = field(init=False)
     _directions: NDArray[np.float32] = field(init=False)
-    _blocks: dict[str, list[_Block]] = field(init=False)
     _stacks: dict[str, Array] = field(init=False)
+    _energy: sparse.csr_array | None = field(init=False, default=None)
+    _blocks: dict[str, list[_Block]] = field(init=False, default_factory=dict)
     _solved: list[Array] = field(init=False, default_factory=list)
     _last: _System | None = field(init=False, default=None)
 
     def __post_init__(self, known: tuple[NDArray[np.float32], ThermalModel] | None) -> None:
         full = self.full
-        energy = full.conduction(self.sample.coefficients, self.sample.channel_film)
-        self._energy = _single(energy + CAPACITY_SHARE * full.capacity(self.sample.capacities))
-        self._blocks = {name: [_block(item) for item in getattr(full, name)] for name in MATRIX_FIELDS}
-        self._stacks = {name: np.zeros((len(self._blocks[name]), 0, 0)) for name in MATRIX_FIELDS}
-        self._directions = room((full.size, FIRST_ROOM), PRECISION)
         if known is None:
+            self._stacks = {name: np.zeros((len(getattr(full, name)), 0, 0)) for name in MATRIX_FIELDS}
+            self._directions = room((full.size, FIRST_ROOM), PRECISION)
             self._join(full.one[:, None].astype(PRECISION))
         else:
-            fields, model = known
-            self._make_room(fields.shape[1])
-            self.size = fields.shape[1]
-            self._directions[:, : self.size] = fields
+            self._directions, model = known
+            self.size = self._directions.shape[1]
             self._stacks = {name: getattr(model, name) for name in MATRIX_FIELDS}
 
     # ------------------------------------------------------------- directions
@@ -152,6 +147,14 @@ class GrowingProjection:
         """Temperatures of coordinates (d', m) on the first d' directions, (n, m) [K]."""
         return self._directions[:, : len(coordinates)] @ coordinates.astype(PRECISION)
 
+    def _prepare_to_grow(self) -> None:
+        """Matrix of the energy, and every operator on its own rows: a basis that is enough needs neither."""
+        if self._energy is None:
+            full = self.full
+            energy = full.conduction(self.sample.coefficients, self.sample.channel_film)
+            self._energy = _single(sum_of(energy, full.capacity(self.sample.capacities), CAPACITY_SHARE))
+            self._blocks = {name: [_block(item) for item in getattr(full, name)] for name in MATRIX_FIELDS}
+
     def add(self, block: NDArray[np.float32], smallest: float = 0.0) -> Array:
         """Let fields (n, m) join; returns their coordinates (d, m) on all directions.
 
@@ -160,6 +163,7 @@ class GrowingProjection:
         smallest : float
             Of what is new in a direction, in the energy norm; what is smaller is left out.
         """
+        self._prepare_to_grow()
         image = np.empty_like(block)
         product_of(self._energy)(block, image)
         known = (self.directions.T @ image).astype(float)
@@ -176,6 +180,7 @@ class GrowingProjection:
 
     def _join(self, fresh: NDArray[np.float32]) -> None:
         """Directions (n, q) as they are."""
+        self._prepare_to_grow()
         fresh = np.ascontiguousarray(fresh)
         old, joined = self.size, self.size + fresh.shape[1]
         self._make_room(joined)
@@ -271,7 +276,7 @@ class GrowingProjection:
             last = _System(sample, _single(conduction), _single(full.capacity(sample.capacities)))
         shift = max(*shifts, SLOW) / FAR
         if last.shift != shift:
-            matrix = (last.conduction + np.float32(shift) * last.capacity).tocsr()
+            matrix = sum_of(last.conduction, last.capacity, shift)
             last = replace(last, shift=shift, preconditioner=build_preconditioner(full.system(matrix)))
         self._last = last
         return last
@@ -347,47 +352,6 @@ class GrowingProjection:
         basis = np.zeros((self.size, count + 1))
         basis[0, 0], basis[1:, 1:] = 1.0, solve_triangular(factor, vectors[:, :count])
         return basis
-
-
-def in_solving_order(full: MeshModel) -> MeshModel:
-    """The model with unknowns renumbered for fast products.
-
-    Neighbours near each other, each material's together, lumped nodes last.
-    """
-    n = full.n_unknowns
-    volumes = [
-        matrix
-        for name, matrix in zip(full.coefficient_names, full.operators, strict=True)
-        if name.startswith("conductivity.")
-    ]
-    pattern = sum(volumes[1:], volumes[0]).tocsr()[:n, :n]
-    near = np.asarray(reverse_cuthill_mckee(pattern, symmetric_mode=True))
-    owner = np.zeros(n, dtype=np.int64)
-    for index, matrix in enumerate(volumes):
-        owner[np.flatnonzero(np.diff(matrix.indptr)[:n])] = index
-    order = np.concatenate((near[np.argsort(owner[near], kind="stable")], np.arange(n, full.size)))
-    place = np.empty_like(order)
-    place[order] = np.arange(full.size)
-
-    def turned(matrix: sparse.csr_array) -> sparse.csr_array:
-        entries = matrix.tocoo()
-        at = (place[entries.row].astype(np.int32), place[entries.col].astype(np.int32))
-        return sparse.coo_array((entries.data, at), shape=matrix.shape).tocsr()
-
-    def columns(rows: sparse.csr_array) -> sparse.csr_array:
-        entries = rows.tocoo()
-        at = (entries.row, place[entries.col].astype(np.int32))
-        return sparse.coo_array((entries.data, at), shape=rows.shape).tocsr()
-
-    changed = {name: tuple(map(turned, getattr(full, name))) for name in MATRIX_FIELDS}
-    changed |= {name: columns(getattr(full, name)) for name in ("places", "probes", "probe_gradients")}
-    if full.ring_shifts.shape[0]:
-        changed["ring_shifts"] = columns(full.ring_shifts)
-    if full.cell_area.size:
-        changed["cell_load"] = columns(full.cell_load)
-    if full.prolongation is not None:
-        changed["prolongation"] = full.prolongation.tocsr()[order[:n]]
-    return replace(full, fluid_load=full.fluid_load[:, order], one=full.one[order], **changed)
 
 
 def _block(matrix: sparse.csr_array) -> _Block:

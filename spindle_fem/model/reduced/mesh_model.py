@@ -126,6 +126,7 @@ def build_mesh_model(machine: PreparedMachine) -> MeshModel:
         gap_radii=gap_radii_of(spec, operators),
         n_unknowns=operators.n_unknowns,
         prolongation=operators.prolongation,
+        mesh_digest=machine.mesh.digest,
         **growing,
         **channel,
     )

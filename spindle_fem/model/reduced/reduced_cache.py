@@ -30,7 +30,7 @@ class KeptBasis:
     mesh : str
         Digest of the mesh.
     fields : (n, r) float32 ndarray
-        Unknowns in the order of :func:`in_solving_order`.
+        Unknowns in the order of :func:`solving_order.in_solving_order`.
     """
 
     mesh: str
@@ -38,16 +38,17 @@ class KeptBasis:
 
     def save(self, digest: str) -> None:
         """Keep it beside the reduced model of a digest."""
-        save_record(self, _basis_path(reduced_path(digest)), BASIS_FORMAT)
+        save_record(self, basis_path(reduced_path(digest)), BASIS_FORMAT)
 
     @classmethod
     def beside(cls, path: Path) -> KeptBasis | None:
         """Basis stored beside a reduced model; None if there is none."""
-        found = load_record(_basis_path(path), BASIS_FORMAT, cls)
+        found = load_record(basis_path(path), BASIS_FORMAT, cls)
         return None if found is None else cls(**found)
 
 
-def _basis_path(path: Path) -> Path:
+def basis_path(path: Path) -> Path:
+    """File of the basis beside a reduced model's."""
     return path.with_name(path.name.replace("reduced-", "basis-", 1))
 
 
