@@ -7,6 +7,7 @@ recording. Without a recording, these are used instead.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from spindle_fem.recordings.standard_inputs import standard_inputs
 DAY = 86400.0
 # Flow and speed vary by this share of the defined values, since laws of the Reynolds number need a range.
 RANGE = 0.5
+# Shares of the highest speed that a run holds one after the other, each for so long, s.
+SPEEDS = (0.25, 0.5, 0.75, 1.0, 1.0, 0.0, 1.0, 0.5, 0.0)
+HOLD = 3600.0
 
 
 def at_the_defined_point(spec: MachineSpec) -> Recording:
@@ -30,6 +34,24 @@ def at_the_defined_point(spec: MachineSpec) -> Recording:
     }
     probes = tuple(probe.name for probe in spec.probe)
     return defined_recording(spec.name, probes, inputs["ambient"], ends, {})
+
+
+def through_its_speeds(spec: MachineSpec, highest: float) -> Recording:
+    """A run from cold through shares of a highest speed [rad/s] and standstill, the rest as defined."""
+    usual = at_the_defined_point(spec)
+    times = HOLD * np.arange(len(SPEEDS) + 1)
+    inputs = np.tile(usual.inputs.mean(axis=0), (len(times), 1))
+    inputs[:, usual.input_names.index("speed")] = highest * np.array([*SPEEDS, SPEEDS[-1]])
+    shape = len(times), len(usual.probes)
+    return replace(
+        usual,
+        times=times,
+        inputs=inputs,
+        temperature=np.resize(usual.temperature, shape),
+        flags=np.zeros(shape, dtype=np.uint8),
+        covariates=np.empty((len(times), 0)),
+        segments=np.array([[0, len(times)]]),
+    )
 
 
 def defined_recording(

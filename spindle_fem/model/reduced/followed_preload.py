@@ -36,9 +36,6 @@ PER_KELVIN, PER_LOG_SPEED, PER_NEWTON = 0.25, 3.0, 0.005
 FRESH, MOST_SAMPLES, MOST_KEPT, MOST_ROUNDS = 16, 320, 1000, 20
 # Samples to begin with are this far apart at least; nearer ones than the second say nothing more.
 FIRST_APART, NEAREST = 0.5, 0.05
-# Share of a response's own span that it may go beyond what is sampled: a run that would leave the samples
-# by more is stopped there, and sampled there next.
-BEYOND = 0.25
 # Errors between samples that are left: of the logarithms of friction, conductances and joints, N and share of
 # the preload.
 FRICTION_ERROR, CONDUCTANCE_ERROR, PRELOAD_ERROR, PRELOAD_SHARE = 2.0e-3, 1.0e-2, 10.0, 5.0e-3
@@ -104,6 +101,9 @@ class FollowedPreload:
 
     Attributes
     ----------
+    responses : list of (MountedSet, SampledResponse, (q,) ndarray)
+        Of every set, with the coordinates of the state in which all unknowns are zero, less those that they
+        are given as.
     reads : tuple of str
         Coordinates of every set's states.
     joints : tuple of str
@@ -114,21 +114,18 @@ class FollowedPreload:
         self.mounted = mounted
         self.lowest_speed = float(mounted.friction.speed[0])
         inputs = self._inputs(samples.speed, samples.thrust)
-        self._responses: list[tuple[MountedSet, SampledResponse]] = []
-        # Coordinates of the state in which all unknowns are zero, less those that they are given as.
-        self._zeros: list[Array] = []
+        self.responses: list[tuple[MountedSet, SampledResponse, Array]] = []
         first = 0
         for group in mounted.sets:
             own = samples.values[:, first : first + group.number]
             states = _scaled(samples.states[:, list(group.rows)]).reshape(len(own), -1)
             response = SampledResponse.through(states, inputs, own)
-            self._responses.append((group, response))
             from_zero = response.middle + _scaled(offsets[list(group.rows)]).ravel()
-            self._zeros.append(from_zero @ response.directions)
+            self.responses.append((group, response, from_zero @ response.directions))
             first += group.number
         self.reads = tuple(
             f"mounted.{group.name}.{number}"
-            for group, response in self._responses
+            for group, response, _ in self.responses
             for number in range(response.directions.shape[1])
         )
         self.joints = tuple(name for group in mounted.sets for name in group.joints)
@@ -143,7 +140,7 @@ class FollowedPreload:
         """Coordinate of one of :attr:`reads` from the unknowns, (r,)."""
         _, group, number = name.rsplit(".", 2)
         rows, _ = self.mounted.rows(model)
-        for own, response in self._responses:
+        for own, response, _ in self.responses:
             if own.name == group:
                 scaled = _scaled(rows[list(own.rows)], axis=1).reshape(-1, model.size)
                 return response.directions[:, int(number)] @ scaled
@@ -153,10 +150,10 @@ class FollowedPreload:
         """Quantities of all sets side by side (n, m) at states (n, n_bearings, width)."""
         inputs = self._inputs(speed, thrust)
         found = []
-        for group, response in self._responses:
+        for group, response, _ in self.responses:
             flat = _scaled(states[:, list(group.rows)]).reshape(len(states), -1)
             at = (flat - response.middle) @ response.directions
-            found.append(response.within(at, inputs, BEYOND)[0])
+            found.append(response.within(at, inputs)[0])
         return np.hstack(found)
 
     def quantities(self, coordinates: NDArray, context: TermContext) -> NDArray:
@@ -177,9 +174,9 @@ class FollowedPreload:
         fresh = np.append(True, np.any(asked[:, 1:] != asked[:, :-1], axis=0))
         own = np.cumsum(fresh) - 1
         found, first = [], 0
-        for (_, response), zero in zip(self._responses, self._zeros, strict=True):
+        for _, response, zero in self.responses:
             rows = slice(first, first + response.directions.shape[1])
-            value, slope = response.within(coordinates[rows][:, fresh].real.T - zero, inputs[fresh], BEYOND)
+            value, slope = response.within(coordinates[rows][:, fresh].real.T - zero, inputs[fresh])
             moved = coordinates[rows].imag.T
             found.append(value[own].T + 1j * np.einsum("kmq,kq->mk", slope[own], moved))
             first = rows.stop

@@ -22,6 +22,9 @@ MOST_DIRECTIONS = 8
 LENGTHS = (2.0, 4.0, 8.0, 16.0, 32.0)
 # Added to the correlation of a state with itself, against rounding.
 NUGGET = 1.0e-9
+# Share of a quantity's span (and one more) that it may go beyond what is sampled: a run that would leave the
+# samples by more is stopped there, and sampled there next.
+BEYOND = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,14 +102,15 @@ class SampledResponse:
         slope = np.einsum("gn,gnc,nm->gmc", falling, apart[:, :, :count], self.weights, optimize=True)
         return value, slope + self.line[1 : 1 + count].T
 
-    def within(self, coordinates: Array, inputs: Array, beyond: float) -> tuple[Array, Array]:
-        """As :meth:`at`, but values stay within ``beyond`` times (1 + span of the samples) of the samples.
+    def limits(self) -> Array:
+        """Smallest and largest value that the response gives, (2, m): somewhat beyond the samples."""
+        reach = BEYOND * (1.0 + np.ptp(self.ends, axis=0))
+        return self.ends + np.array([[-1.0], [1.0]]) * reach
 
-        A value held at that limit does not change with the coordinates.
-        """
+    def within(self, coordinates: Array, inputs: Array) -> tuple[Array, Array]:
+        """As :meth:`at`, but within :meth:`limits`; a value held there does not change with coordinates."""
         value, slope = self.at(coordinates, inputs)
-        reach = beyond * (1.0 + np.ptp(self.ends, axis=0))
-        held = np.clip(value, self.ends[0] - reach, self.ends[1] + reach)
+        held = np.clip(value, *self.limits())
         return held, np.where((held == value)[:, :, None], slope, 0.0)
 
 

@@ -18,7 +18,6 @@ from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.standard_inputs import standard_inputs
 from spindle_fem.studies.export.effect_export import ExportedEffects
-from spindle_fem.studies.export.feedback_export import FeedbackTable
 from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
 from spindle_fem.studies.export.operator_tables import (
     OperatorTable,
@@ -29,6 +28,7 @@ from spindle_fem.studies.export.operator_tables import (
     operator_shapes,
     sampled_table,
 )
+from spindle_fem.studies.export.state_space import FeedbackTable
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]

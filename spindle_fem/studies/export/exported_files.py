@@ -129,7 +129,7 @@ def _c_content(space: StateSpace) -> dict[str, Any]:
     for end, none in ends.items():
         kept[f"input_{end}"] = np.array([none if i[end] is None else i[end] for i in header["inputs"]])
     load_input = kept.pop("load_input").astype(int)
-    tables = _c_tables(header, kept)
+    tables, responses = _c_tables(header, kept), _c_responses(space)
     feedback = {"feedbacks": 0, "followed": len(header["feedback_tables"]), "held": header["held_tables"]}
     if feedback["followed"]:
         held = np.isin(header["feedback_tables"], header["held_tables"]).astype(int)
@@ -141,6 +141,10 @@ def _c_content(space: StateSpace) -> dict[str, Any]:
             "feedbacks": len(kept["feedback.column"]),
             "feedback_column": kept.pop("feedback.column").astype(int),
             "feedback_table": own,
+            "feedback_less": _or_behind(kept.pop("feedback.less"), _columns(tables, "feedback")),
+            "feedback_response": _or_behind(
+                kept.pop("feedback.response"), sum(item["quantities"] for item in responses)
+            ),
             "slope_step": SLOPE_STEP,
             "close": CLOSE,
             "most_rounds": MOST_ROUNDS,
@@ -165,6 +169,7 @@ def _c_content(space: StateSpace) -> dict[str, Any]:
         "most_axes": max((len(table["grids"]) for table in tables), default=1),
         "weights": max(1, _columns(tables, "operator")),
         "factors": _columns(tables, "feedback"),
+        "responses": responses,
         **feedback,
         "gamma": GAMMA,
         "diagonal": 0.5 * GAMMA,
@@ -194,6 +199,34 @@ def _c_tables(header: Mapping[str, Any], kept: Mapping[str, Array]) -> list[dict
         )
         first[kind] += columns
     return found
+
+
+def _c_responses(space: StateSpace) -> list[dict[str, Any]]:
+    """Responses as the template has them, with numbers of samples, coordinates and quantities."""
+    found, coordinate, quantity = [], 0, 0
+    for response in space.header["responses"]:
+        samples, width = space.arrays[f"{response['name']}.samples"].shape
+        quantities = space.arrays[f"{response['name']}.weights"].shape[1]
+        coordinates = width - len(response["inputs"])
+        found.append(
+            {
+                **response,
+                "samples": samples,
+                "width": width,
+                "coordinates": coordinates,
+                "first_coordinate": coordinate,
+                "quantities": quantities,
+                "first": quantity,
+            }
+        )
+        coordinate, quantity = coordinate + coordinates, quantity + quantities
+    return found
+
+
+def _or_behind(numbers: Array, count: int) -> NDArray[np.int64]:
+    """Numbers of entries; that behind the last of them where there is none."""
+    found = numbers.astype(int)
+    return np.where(found < 0, count, found)
 
 
 def _table_of(tables: list[dict[str, Any]], column: Array) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,8 @@ from spindle_fem.operation.friction_map import CONDUCTANCES, FILM_TEMPERATURES, 
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.studies.export.effect_export import ExportedEffects
 from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
+from spindle_fem.studies.export.preload_export import ExportedPreload
+from spindle_fem.studies.export.state_space import FeedbackTable
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
@@ -28,45 +29,15 @@ WALL_RANGE, SURROUNDINGS_RANGE = (-60.0, 120.0), (-10.0, 50.0)
 FILM_SHARES = (0.25, 0.25, 0.5)
 
 
-@dataclass(frozen=True, slots=True)
-class FeedbackTable:
-    """Heats that follow one temperature of the machine, and inputs.
-
-    Attributes
-    ----------
-    sense : (r,) ndarray
-        The temperature, °C, from the unknowns.
-    sense_load : mapping of load to float
-        And from the loads.
-    inputs : tuple of str
-        Axes behind that temperature.
-    axes : tuple of ndarray
-    values : (n, ..., m) ndarray
-    column : (d,) int ndarray
-        Which of the m values each heat is proportional to.
-    out, into : (d, r) ndarray
-        What each heat warms, and the temperature that it is proportional to.
-    load : list of d mappings of load to float
-        And the loads that it is proportional to.
-    read : (d, p) ndarray or None
-        What each adds to the outputs where these are read; nothing where None.
-    """
-
-    sense: Array
-    sense_load: dict[str, float]
-    inputs: tuple[str, ...]
-    axes: tuple[Array, ...]
-    values: Array
-    column: NDArray[np.int64]
-    out: Array
-    into: Array
-    load: list[dict[str, float]]
-    read: Array | None = None
-
-
 def film_heat_of(fast: FastModel) -> FilmHeat | None:
     """The term that brings friction and ball rows to their films, where there is one."""
     return next((term for term in fast.inputs.extra_terms if isinstance(term, FilmHeat)), None)
+
+
+def preload_of(fast: FastModel) -> ExportedPreload | None:
+    """Preload that follows the temperatures, where the model's bearings do."""
+    term = film_heat_of(fast)
+    return None if term is None or term.preload is None else ExportedPreload(fast, term.preload)
 
 
 def feedback_tables(
@@ -81,6 +52,9 @@ def feedback_tables(
     highest : float, [rad/s]
     """
     found = [] if film_heat_of(fast) is None else _bearing_tables(fast, constant, highest, effects.factors)
+    preload = preload_of(fast)
+    if preload is not None and preload.joints:
+        found.append(preload.joint_table(effects))
     return found + [
         _natural_table(fast, film, surface, effects)
         for film in fast.spec.film
@@ -92,7 +66,7 @@ def feedback_tables(
 def _bearing_tables(
     fast: FastModel, constant: str, highest: float, scaled: Mapping[str, float]
 ) -> list[FeedbackTable]:
-    """Friction heat and what ball rows conduct beyond films at 30 °C, of every bearing."""
+    """Friction heat and what ball rows conduct beyond what the operators hold, of every bearing."""
     term, names = film_heat_of(fast), fast.bearings
     known = term.friction_map
     films = np.linspace(*FILM_TEMPERATURES, 3)
@@ -100,30 +74,19 @@ def _bearing_tables(
     followed = np.isin(np.arange(len(names)), term.follow)
 
     def at(speed: float, thrust: float, film: Array) -> Array:
-        """Friction heat and conductances beyond the nominal, (n_bearings, 3, k)."""
+        """Friction heat, conductances, and those that the operators hold, (n_bearings, 5, k)."""
         series = known.at(speed, thrust)
         kelvin = np.tile(film, (len(names), 1))
         heat = speed * np.exp(series.at(kelvin, MOMENT)) * factors[:, None, None]
-        nominal = known.nominal_conductance(speed, thrust)[:, :, None]
-        more = (np.exp(series.at(kelvin, CONDUCTANCES)) - nominal) * followed[:, None, None]
-        return np.concatenate((heat, more), axis=1)
+        now = np.exp(series.at(kelvin, CONDUCTANCES)) * followed[:, None, None]
+        nominal = known.nominal_conductance(speed, thrust)[:, :, None] * followed[:, None, None]
+        return np.concatenate((heat, now, np.broadcast_to(nominal, now.shape)), axis=1)
 
     thrusts = known.thrust
     middle = float(thrusts[thrusts.size // 2])
-    # Sums that do not vanish, for the tolerance.
-    nominal = known.nominal_conductance(highest, middle)[:, :, None]
-    speeds = refined_axis(
-        lambda speed: (at(speed, middle, films) + np.pad(nominal, ((0, 0), (1, 0), (0, 0)))).ravel(),
-        0.0,
-        highest,
-        TOLERANCE,
-    )
+    speeds = refined_axis(lambda speed: at(speed, middle, films).ravel(), 0.0, highest, TOLERANCE)
     kelvin = refined_axis(
-        lambda film: (
-            at(0.5 * highest, middle, np.array([film])) + np.pad(nominal, ((0, 0), (1, 0), (0, 0)))
-        ).ravel(),
-        *FILM_TEMPERATURES,
-        TOLERANCE,
+        lambda film: at(0.5 * highest, middle, np.array([film])).ravel(), *FILM_TEMPERATURES, TOLERANCE
     )
     loads = thrusts
     if thrusts.size > 1:
@@ -141,6 +104,7 @@ def _bearing_tables(
         values, inputs, axes = values[:, :, :, 0], inputs[:1], axes[:2]
     shares, _ = fast.inputs.friction_loads(np.eye(len(names)), scaled)
     none = np.zeros(fast.model.size)
+    mounted = preload_of(fast)
     found = []
     for row, name in enumerate(names):
         inner, outer, balls = (
@@ -158,6 +122,8 @@ def _bearing_tables(
                 np.array([warmed, inner - balls, outer - balls]),
                 np.array([none, balls - inner, balls - outer]),
                 [{constant: 1.0}, {}, {}],
+                less=np.array([-1, 3, 4]),
+                response=None if mounted is None else np.array(mounted.bearings[name]),
             )
         )
     return found

@@ -24,9 +24,9 @@ from spindle_fem.studies.export.coolant_export import (
 from spindle_fem.studies.export.effect_export import ExportedEffects, heat_tables
 from spindle_fem.studies.export.feedback_export import (
     SURROUNDINGS_RANGE,
-    FeedbackTable,
     feedback_tables,
     film_heat_of,
+    preload_of,
 )
 from spindle_fem.studies.export.operator_tables import PARTS, changes_at, circuit_table, speed_table
 from spindle_fem.studies.export.source_export import source_loads
@@ -34,6 +34,7 @@ from spindle_fem.studies.export.state_space import (
     CELSIUS,
     CONSTANT,
     TR_BDF2,
+    FeedbackTable,
     ModelInput,
     PowerLoad,
     StateSpace,
@@ -51,6 +52,8 @@ FLOW_SHARES = (0.25, 2.0)
 INLET_RANGE = (-10.0, 20.0)
 # Warming of the coolant by friction allowed for at the upper end of its properties, K.
 OWN_WARMING = 2.0
+# Load that is the square of the speed.
+ROTATION = "rotation"
 # Largest thrust, in the larger of the definition's and the heat table's reference.
 THRUST_SHARE = 2.0
 
@@ -107,17 +110,22 @@ def _state_space(
     by_table = film_heat is None or not film_heat.bearings
     heats = range(n_heat) if by_table else ()
     heat_over_inputs = [*sources.tables, *effect_tables]
-    own = range(n_load, n_load + 1 + len(sources.powers) + len(heat_over_inputs))
-    order = [*range(n_heat, n_load), *own[: 1 + len(sources.powers)], *heats, *own[1 + len(sources.powers) :]]
+    # Rotation stretches what displacement sensors read.
+    spins = fast.model.probe_spins
+    turning = [PowerLoad(ROTATION, "rad**2/s**2", position["speed"], 1.0, 2.0)] if np.any(spins) else []
+    beside = [PowerLoad(CONSTANT, "1", -1), *turning, *sources.powers]
+    own = range(n_load, n_load + len(beside) + len(heat_over_inputs))
+    order = [*range(n_heat, n_load), *own[: len(beside)], *heats, *own[len(beside) :]]
     powers = [_fluid_load(fast, load, position) for load in fast.load_names[n_heat:]]
-    powers += [PowerLoad(CONSTANT, "1", -1), *sources.powers]
+    powers += beside
     loads = {load.name: load.unit for load in powers}
     if by_table:
         loads |= {f"heat.{place}": "W" for place in fast.heat_places}
     loads |= {table.load: "W" for table in heat_over_inputs}
     places = [*sources.places, *(table.place for table in heat_over_inputs)]
-    # The constant load drives nothing by itself.
-    warmed = np.array([np.zeros(fast.model.size), *(fast.model.place(place) for place in places)]).T
+    # The constant load and rotation heat nothing.
+    cold = (1 + len(turning)) * [np.zeros(fast.model.size)]
+    warmed = np.array([*cold, *(fast.model.place(place) for place in places)]).T
     operators = fast.operators(
         nominal if wall is None else coolant.at_wall(nominal),
         effects.factors,
@@ -141,8 +149,10 @@ def _state_space(
 
     arrays = power_load_arrays(powers)
     arrays |= arrays_of(operators.conduction, operators.loads, operators.outputs, operators.output_inputs)
-    entering = {CONSTANT, *(load.name for load in sources.powers), *(item.load for item in heat_over_inputs)}
+    entering = {*(load.name for load in beside), *(item.load for item in heat_over_inputs)}
     arrays["load"][:, [load in entering for load in loads]] = modes.T @ warmed
+    if turning:
+        arrays["feedthrough"][fast.point_rows, list(loads).index(ROTATION)] = spins
     arrays["uniform"] = modes.T @ storage @ fast.model.one
     sensors = {item.name for item in spec.displacement_sensor}
     outputs = {channel: "um" if channel in sensors else CELSIUS for channel in fast.channels}
@@ -185,6 +195,10 @@ def _state_space(
         add_table(f"follows{number}", "feedback_tables", table.axes, numbers, table.values)
     if of_wall is not None:
         header["held_tables"].append(header["feedback_tables"][-1])
+    mounted = preload_of(fast)
+    if mounted is not None:
+        header["responses"] = mounted.header(position)
+        arrays |= mounted.arrays(modes)
     if followed:
         arrays |= _feedback_arrays(followed, modes, list(loads), len(fast.channels))
         for sensor, line in effects.sensors:
@@ -202,10 +216,20 @@ def _feedback_arrays(
 
     first = np.cumsum([0, *(table.values.shape[-1] for table in tables)])
     columns = [table.column + start for table, start in zip(tables, first, strict=False)]
+    none = [np.full(len(table.column), -1) for table in tables]
+    less = [
+        own if table.less is None else np.where(table.less < 0, -1, table.less + start)
+        for table, own, start in zip(tables, none, first, strict=False)
+    ]
+    response = [
+        own if table.response is None else table.response for table, own in zip(tables, none, strict=True)
+    ]
     return {
         "feedback.sense": np.array([table.sense for table in tables]) @ modes,
         "feedback.sense_load": rows([table.sense_load for table in tables]),
         "feedback.column": np.concatenate(columns).astype(float),
+        "feedback.less": np.concatenate(less).astype(float),
+        "feedback.response": np.concatenate(response).astype(float),
         "feedback.out": np.concatenate([table.out for table in tables]) @ modes,
         "feedback.into": np.concatenate([table.into for table in tables]) @ modes,
         "feedback.load": rows([own for table in tables for own in table.load]),

@@ -13,7 +13,9 @@ time. With ``scheme = "TR-BDF2"`` ``K``, ``B``, ``C`` and ``D`` follow the input
 with ``a_i`` from tables, and steps are of second order and L-stable. Friction, ball rows and
 films that follow temperatures add heats ``a(s, inputs) (in x + drive w)`` with ``s`` a temperature of the
 machine, some of which are read with the outputs; their values at the end of a step are found by Newton's
-method. Those of ``held_tables`` keep the ``a`` of the middle of a step all through it, as ``K`` does.
+method. Those of ``held_tables`` keep the ``a`` of the middle of a step all through it, as ``K`` does. Where
+expansion changes bearings and joints, ``a`` becomes ``a exp(q) - b`` with ``q`` from ``responses``: kriged
+between states of the machine at which the bearings were solved.
 Temperatures are in °C, all else in the units that the model names.
 """
 
@@ -26,7 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
-SCHEMA = "spindle-fem/state-space/2"
+SCHEMA = "spindle-fem/state-space/3"
 # TR-BDF2, Bank et al. (1985), IEEE Trans. CAD 4, 436-451.
 GAMMA = 2.0 - math.sqrt(2.0)
 STAGE_WEIGHT, START_WEIGHT = 0.5 + 1.0 / math.sqrt(2.0), 1.0 / math.sqrt(2.0) - 0.5
@@ -159,6 +161,7 @@ class PortableModel:
         self._column = kept["feedback.column"].astype(int)
         ends = np.cumsum([kept[f"{name}.values"].shape[-1] for name in names])
         self._table = np.searchsorted(ends, self._column, side="right")
+        self._less, self._response = (kept[f"feedback.{key}"].astype(int) for key in ("less", "response"))
         self._held_tables = np.isin(names, self.header["held_tables"])
         self._held = self._held_tables[self._table]
 
@@ -168,20 +171,66 @@ class PortableModel:
             return np.zeros(0)
         return self.arrays["feedback.sense"] @ state + self.arrays["feedback.sense_load"] @ loads
 
-    def _factors(self, values, sensed):
-        """Factors of the heats that follow temperatures, (d,)."""
+    def _tabulated(self, values, sensed):
+        """Entries of all feedback tables side by side, and a last one of 0."""
         known = np.concatenate((values, sensed))
         names = self.header["feedback_tables"]
-        return np.concatenate([self._lookup(name, known) for name in names])[self._column]
+        return np.concatenate([*(self._lookup(name, known) for name in names), [0.0]])
+
+    def _coordinates(self, response, values, state):
+        """Where a response is asked: coordinates of the state, then inputs."""
+        kept, found = self.arrays, []
+        for item in response["inputs"]:
+            value = max(values[item["input"]], item["lowest"])
+            found.append(item["gain"] * (math.log(value) if item["logarithm"] else value))
+        name = response["name"]
+        return np.concatenate((kept[f"{name}.rows"] @ state - kept[f"{name}.zero"], found))
+
+    def _responses(self, values, state):
+        """Logarithms of all responses and a last one of 0 (q,), and their derivatives to the state (q, r)."""
+        kept, found, by = self.arrays, [], []
+        for response in self.header["responses"]:
+            own = {key: kept[f"{response['name']}.{key}"] for key in ("rows", "weights", "line", "limits")}
+            at = self._coordinates(response, values, state)
+            apart = at - kept[f"{response['name']}.samples"]
+            # Matern's correlation with 5/2 beside a straight line
+            scaled = math.sqrt(5.0) / response["length"] * np.linalg.norm(apart, axis=1)
+            fading = np.exp(-scaled)
+            value = (1.0 + scaled + scaled**2 / 3.0) * fading @ own["weights"]
+            value = value + own["line"][0] + at @ own["line"][1:]
+            falling = -5.0 / (3.0 * response["length"] ** 2) * (1.0 + scaled) * fading
+            count = len(own["rows"])
+            slope = own["weights"].T @ (falling[:, None] * apart[:, :count]) + own["line"][1 : 1 + count].T
+            held = np.clip(value, *own["limits"])
+            found.append(held)
+            by.append(np.where((held == value)[:, None], slope, 0.0) @ own["rows"])
+        return np.concatenate((*found, [0.0])), np.concatenate((*by, np.zeros((1, len(state)))))
+
+    def _unsampled(self, inputs):
+        """Whether the bearings are in a state far from those at which they were solved."""
+        values = self._usable(inputs)
+        for response in self.header["responses"]:
+            apart = (
+                self._coordinates(response, values, self.state) - self.arrays[f"{response['name']}.samples"]
+            )
+            if np.linalg.norm(apart, axis=1).min() > response["reach"]:
+                return True
+        return False
 
     def _feedback(self, values, loads, state):
         """Heats that follow temperatures (d,) [W], and their derivatives to the state (d, r)."""
         kept, sensed = self.arrays, self._sensed(loads, state)
         flux = kept["feedback.into"] @ state + kept["feedback.load"] @ loads
-        factor = self._factors(values, sensed)
-        slope = flux * (self._factors(values, sensed + SLOPE_STEP) - factor) / SLOPE_STEP
+        logarithm, logarithm_by = self._responses(values, state)
+        grown = np.exp(logarithm)[self._response]
+        found, beside = self._tabulated(values, sensed), self._tabulated(values, sensed + SLOPE_STEP)
+        factor = found[self._column] * grown - found[self._less]
+        moved = beside[self._column] * grown - beside[self._less]
+        slope = flux * (moved - factor) / SLOPE_STEP
         by_state = (
-            factor[:, None] * kept["feedback.into"] + slope[:, None] * kept["feedback.sense"][self._table]
+            factor[:, None] * kept["feedback.into"]
+            + slope[:, None] * kept["feedback.sense"][self._table]
+            + (flux * found[self._column] * grown)[:, None] * logarithm_by[self._response]
         )
         return factor * flux, by_state
 
@@ -251,7 +300,8 @@ class PortableModel:
         Returns
         -------
         list of str
-            Inputs that were beyond the range.
+            Inputs that were beyond the range; ``preload`` where the bearings are far from every state at
+            which they were solved.
         """
         after = inputs if inputs_after is None else inputs_after
         begin, end = self._usable(inputs), self._usable(after)
@@ -261,7 +311,8 @@ class PortableModel:
             first, last = (begin + (end - begin) * min(1.0, at / seconds) for at in (passed, passed + length))
             advance(length, first, last)
             passed += length
-        return sorted({*self.outside(inputs), *self.outside(after)})
+        unknown = ["preload"] if self._unsampled(after) else []
+        return sorted({*self.outside(inputs), *self.outside(after), *unknown})
 
     def _lengths(self, seconds, begin, end):
         """Lengths of the steps into which one is divided, s."""
@@ -329,7 +380,8 @@ class PortableModel:
         conduction, load, _, _ = self.matrices(middle)
         if sensed.size and self._held.any():
             kept, held = self.arrays, self._held
-            warmed = (self._factors(middle, sensed)[held, None] * kept["feedback.out"][held]).T
+            factor = self._tabulated(middle, sensed)[self._column[held]]
+            warmed = (factor[:, None] * kept["feedback.out"][held]).T
             conduction = conduction - warmed @ kept["feedback.into"][held]
             load = load + warmed @ kept["feedback.load"][held]
         inverse = np.linalg.inv(np.eye(len(conduction)) + 0.5 * GAMMA * step * conduction)

@@ -88,6 +88,47 @@ class PowerLoad:
     offset: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class FeedbackTable:
+    """Heats that follow one temperature of the machine, and inputs.
+
+    Attributes
+    ----------
+    sense : (r,) ndarray
+        The temperature, °C, from the unknowns.
+    sense_load : mapping of load to float
+        And from the loads.
+    inputs : tuple of str
+        Axes behind that temperature.
+    axes : tuple of ndarray
+    values : (n, ..., m) ndarray
+    column : (d,) int ndarray
+        Which of the m values each heat is proportional to.
+    out, into : (d, r) ndarray
+        What each heat warms, and the temperature that it is proportional to.
+    load : list of d mappings of load to float
+        And the loads that it is proportional to.
+    read : (d, p) ndarray or None
+        What each adds to the outputs where these are read; nothing where None.
+    less, response : (d,) int ndarray or None
+        A heat is proportional to ``values[column] exp(q) - values[less]``, with ``q`` the logarithm of that
+        number among the responses of the bearings. Neither where -1 or None.
+    """
+
+    sense: Array
+    sense_load: dict[str, float]
+    inputs: tuple[str, ...]
+    axes: tuple[Array, ...]
+    values: Array
+    column: NDArray[np.int64]
+    out: Array
+    into: Array
+    load: list[dict[str, float]]
+    read: Array | None = None
+    less: NDArray[np.int64] | None = None
+    response: NDArray[np.int64] | None = None
+
+
 def modal_basis(storage: Array, conduction: Array) -> Array:
     """Modes of a model as columns, each scaled to store one unit, (n, n).
 
@@ -137,6 +178,7 @@ def header_of(
         "operator_tables": [],
         "feedback_tables": [],
         "held_tables": [],
+        "responses": [],
         "table_inputs": {},
         "notes": [],
     }
