@@ -59,13 +59,13 @@ def machine_state_space(
         return network_state_space(fast, spec.name, effects_on(spec.effects, fast, day))
     fast = fast_model_for(at_assembly_size(spec), recordings, as_given=True, progress=progress)
     effects = effects_on(spec.effects, fast, at_the_defined_point(spec))
-    highest, notes = options_for(spec, recordings).highest_speed_of(spec), []
+    highest, note = options_for(spec, recordings).highest_speed_of(spec), None
     if spec.follows_preload:
         fast, highest, note = _with_preload(spec, fast, recordings, effects, highest, progress)
-        notes.append(note)
     progress("tables over speed and coolant")
     space = geometry_state_space(fast, spec.name, highest, effects)
-    space.header["notes"][:0] = notes
+    if note is not None:
+        space.header["notes"].insert(0, note)
     return space
 
 
