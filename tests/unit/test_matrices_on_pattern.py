@@ -10,7 +10,8 @@ from spindle_fem.model.matrices_on_pattern import MatricesOnPattern, sum_of
 @pytest.fixture
 def matrices():
     draw = np.random.default_rng(4)
-    return [sparse.random_array((30, 30), density=share, rng=draw, format="csr") for share in (0.2, 0.01, 0.1)]
+    shares = (0.2, 0.01, 0.1)
+    return [sparse.random_array((30, 30), density=share, rng=draw, format="csr") for share in shares]
 
 
 @pytest.fixture

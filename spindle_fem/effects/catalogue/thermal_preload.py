@@ -86,8 +86,8 @@ class PreloadMechanicsTerm(Term):
     difference of the set, and by the gap that outer rings, warmer than the housing, close. The differences
     between the bearings scale with the unevenness: 1 as the mechanics predicts, 0 all equal. ``m₁₀`` is the
     mean increase at 10 K as assembled, so that ``a / m₁₀`` is the share of the friction that follows the
-    load. A set that goes slack loses that share as a power of its friction, which stays above 0. The lag is that of
-    what lies between the places read and the raceways.
+    load. A set that goes slack loses that share as a power of its friction, which stays above 0. The lag is
+    that of what lies between the places read and the raceways.
     """
 
     n_states = 2
