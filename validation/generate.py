@@ -21,6 +21,8 @@ from .study_writer import study_options, write_study
 
 UNSEEN_RATIO, UNSEEN_CHI2 = 0.3, 20.0
 CLEAR_RATIO, CLEAR_CHI2 = 1.0, 120.0
+# What one of several effects leaves without the others hardly shows below this.
+FAINT_RATIO = 0.6
 # No effect moves a reading by more, K; what does is an explicit law that its steps cannot follow.
 LARGEST_CHANGE = 300.0
 # A mimic that leaves a residual below this is indistinguishable from the truth.
@@ -58,7 +60,7 @@ def _apply(
 
 
 def what_is_known(study: Study, effects: list[Concealed]) -> dict[str, object]:
-    """Ratio of the effect after a re-fit, its parts, and the best mimics."""
+    """Ratio of the effect after a re-fit, what is left without each and by each of three alone, mimics."""
     parts = [[e.machine or e.sensor for e in effects if e is not left] for left in effects]
     whole = [e.machine or e.sensor for e in effects]
     truth = study.simulate(whole)
@@ -71,6 +73,12 @@ def what_is_known(study: Study, effects: list[Concealed]) -> dict[str, object]:
             direction = study.diagnosed_only(study.simulate(rest))
             left = study.fit_linear(change, direction[:, None])
             each.append({"effect": effect.effect, "ratio": round(left[0], 3), "chi2": round(left[1], 1)})
+    alone = []
+    if len(effects) > 2:
+        for effect in effects:
+            direction = study.diagnosed_only(study.simulate([effect.machine or effect.sensor]))
+            left = study.fit_linear(change, direction[:, None])
+            alone.append({"effect": effect.effect, "ratio": round(left[0], 3), "chi2": round(left[1], 1)})
     mimics = [*machine_mimics(study.model, study.plan), *sensor_mimics()]
     columns = [study.mimic_column(mimic, []) for mimic in mimics]
     table = []
@@ -108,6 +116,7 @@ def what_is_known(study: Study, effects: list[Concealed]) -> dict[str, object]:
         "ratio": round(ratio, 3),
         "chi2": round(chi2, 1),
         "each": each,
+        "alone": alone,
         "own_simple_form": {"ratio": round(same[0][2], 3), "chi2": round(same[0][3], 1)} if same else None,
         "best_mimics": best[:6],
         "pair_mimics": twins,
@@ -240,10 +249,16 @@ def judge(effects: list[Concealed], known: dict[str, object] | None, calibrated:
             out["acceptable_sets"].append(effects_set(rest))
             if _verdict_of(rest) not in verdicts:
                 verdicts.append(_verdict_of(rest))
-        elif part["ratio"] < 0.6 or part["chi2"] < CLEAR_CHI2 / 2:
+        elif part["ratio"] < FAINT_RATIO or part["chi2"] < CLEAR_CHI2 / 2:
             out["clear"] = False
             out["acceptable_sets"].append(effects_set(rest))
             verdicts.append(_verdict_of(rest))
+    # Of three, one alone may leave nothing that shows of the other two together.
+    for effect, part in zip(effects, known.get("alone", ()), strict=False):
+        if part["ratio"] < FAINT_RATIO or part["chi2"] < CLEAR_CHI2 / 2:
+            out["clear"] = False
+            out["acceptable_sets"].append(effects_set([effect]))
+            verdicts.append(_verdict_of([effect]))
     twins = [t for t in (*known["best_mimics"], *known["pair_mimics"]) if _twin(t, total)]
     if twins:
         out["clear"] = False

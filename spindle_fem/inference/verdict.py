@@ -312,27 +312,25 @@ def judge(
     # Held-out readings count by what is left of them beyond what is left of those that were fitted.
     inexact = max(inexact, unexplained_share(rest), unexplained_share(beyond(chosen.fit) / max(1.0, rest)))
     known_as_one = overlapping or {}
+    # Which bearing of a set it is does not matter for the decision; the best represents all.
+    alike, rivals = _as_one(ranked, known_as_one)
     near = [
         item
-        for item in ranked[1:]
+        for item in rivals
         if item.probability >= tuned.NEAR_PROBABILITY
         and may_stand_for(item.fit, chosen.fit, known_as_one)
         and item.best.misfit < chosen.best.misfit + tuned.NEAR_MISFIT
         and apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
     ]
-    # Which bearing of a set it is does not matter for the decision; the best represents all.
-    alike = [item for item in ranked if are_alike(item.fit, chosen.fit, known_as_one)]
-    evidence = sum(item.probability for item in alike)
+    evidence = alike.probability
     share = share_of_last(hypotheses, chosen.best)
     size = len(chosen.fit.candidates)
     more = gain_of_more(hypotheses, chosen.best)
     known = (1.0 - nothing) * (1.0 - inexact) * reliable(evidence, size, share, more) / evidence
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
-        for item in ranked[1:]
-        if (known * item.probability >= tuned.LISTED or item in near)
-        and item.fit.candidates
-        and item not in alike
+        for item in rivals
+        if (known * item.probability >= tuned.LISTED or item in near) and item.fit.candidates
     )
     # What every likely set holds is sure, whether there is more or not.
     common = sum(item.probability for item in ranked if holds(item.fit, chosen.fit, known_as_one))
@@ -364,6 +362,20 @@ def judge(
         more,
         rest,
     )
+
+
+def _as_one(
+    ranked: Sequence[Ranked], overlapping: Mapping[str, frozenset[str]]
+) -> tuple[Ranked, list[Ranked]]:
+    """The first set, and the others, each with the probability of all that name its effects where it does."""
+    found: list[Ranked] = []
+    for item in ranked:
+        like = next((i for i, one in enumerate(found) if are_alike(item.fit, one.fit, overlapping)), None)
+        if like is None:
+            found.append(item)
+        else:
+            found[like] = replace(found[like], probability=found[like].probability + item.probability)
+    return found[0], sorted(found[1:], key=lambda item: -item.probability)
 
 
 def _predicts(

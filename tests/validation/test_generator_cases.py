@@ -1,5 +1,6 @@
 import gzip
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -294,6 +295,23 @@ def test_judgement_of_what_cannot_be_seen(reduced):
     clear = judge([effect], known, calibrated=True)
     assert clear["clear"]
     assert clear["acceptable_verdicts"] == ["missing_physics"]
+
+
+@pytest.mark.parametrize(
+    ("left", "accepted"), [((0.24, 400.0), True), ((2.0, 37.0), True), ((2.0, 400.0), False)]
+)
+def test_one_of_three_is_accepted_alone_where_the_others_hardly_show(left, accepted):
+    effects = [
+        SimpleNamespace(effect=name, kind="missing_physics", acceptable=["x"], outside_catalogue=False)
+        for name in ("one", "two", "three")
+    ]
+    parts = [{"effect": item.effect, "ratio": 3.0, "chi2": 500.0} for item in effects]
+    known = {"ratio": 5.0, "chi2": 4000.0, "each": parts, "best_mimics": [], "pair_mimics": []}
+    known |= {"own_simple_form": None, "alone": [parts[0] | dict(zip(("ratio", "chi2"), left, strict=True))]}
+    out = judge(effects, known, calibrated=True)
+    sets = [[item["effect"] for item in one] for one in out["acceptable_sets"]]
+    assert (["one"] in sets) is accepted
+    assert out["clear"] is not accepted
 
 
 def test_a_study_says_which_effects_it_conceals_in_no_case():

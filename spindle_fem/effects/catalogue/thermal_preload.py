@@ -39,9 +39,9 @@ EXPONENT_SIGMA, STATE_SIGMA = 0.12, 0.2
 HOUSING_SIGMA = 0.3
 # Standard deviation of the unevenness within a set: spacers ground to fit share the load otherwise.
 UNEVENNESS_SIGMA = 0.5
-# In standard deviations of the clearance: a fit looser than ordered is likelier than a tighter one, as rings
-# are made smaller than their size and bores larger.
-CLEARANCES = (-2.0, 4.0)
+# In standard deviations of the clearance, from what is ordered: its ends and root mean square. A fit looser
+# than ordered is likelier than a tighter one, as rings are made smaller than their size and bores larger.
+CLEARANCES, CLEARANCE_WIDTH = (-2.0, 4.0), 1.6
 
 
 class ThermalPreloadTerm(Term):
@@ -103,7 +103,7 @@ class PreloadMechanicsTerm(Term):
         low, high = (nominal + side * sigma for side in CLEARANCES)
         self.parameters = (
             amplitude(NAME, LOAD_SHARE_SIGMA * self.increase, high=MOST_LOAD_SHARE * self.increase),
-            linear("outer_clearance", nominal, sigma, "m", low=low, high=high),
+            linear("outer_clearance", nominal, CLEARANCE_WIDTH * sigma, "m", low=low, high=high),
             linear("unevenness", 1.0, UNEVENNESS_SIGMA, low=0.0, high=1.0 + 2.0 * UNEVENNESS_SIGMA),
             shape("exponent_factor", 1.0, STATE_SIGMA, low=0.5, high=2.0),
             shape("housing_share", 1.0, HOUSING_SIGMA, low=0.2, high=3.0),
@@ -164,7 +164,7 @@ class ThermalPreload(Effect):
             "or, as without fits, × 1 + a (w s₊(x/w) / 10 K)^m"
         ),
         size=(
-            "a ± m₁₀/2, clearance ± IT6/3, unevenness 1 ± 0.5, e 1 ×/÷ e^0.2, housing's share 1 ×/÷ e^0.3, "
+            "a ± m₁₀/2, clearance ± 0.5 IT6, unevenness 1 ± 0.5, e 1 ×/÷ e^0.2, housing's share 1 ×/÷ e^0.3, "
             "τ 200 s ×/÷ e^0.8; "
             "without fits a ± 0.25; m 1.45 ×/÷ e^0.12; τ 600 s ×/÷ e^0.4; w 1.5 K ×/÷ e^0.4"
         ),
