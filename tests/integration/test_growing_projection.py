@@ -23,7 +23,6 @@ from spindle_fem.model.reduced.mesh_model import build_mesh_model
 from spindle_fem.model.reduced.reduced_cache import KeptBasis, family_of, reduced_digest, reduced_path
 from spindle_fem.model.reduced.solving_order import in_solving_order
 from spindle_fem.model.thermal_model import MATRIX_FIELDS
-from spindle_fem.operation.coefficient_table import build_coefficient_table, free_parameters
 
 SHIFTS = (0.0, 1.0e-3)
 
@@ -36,9 +35,7 @@ def models(small):
 
 @pytest.fixture(scope="module")
 def samples(small, models):
-    full = models[1]
-    table = build_coefficient_table(small.spec, full.contacts, full.gap_radii)
-    sampler = _Sampler(small.spec, full, table, free_parameters(small.spec), ReductionOptions())
+    sampler = _Sampler.of(small.spec, models[1], ReductionOptions())
     return sampler.sample({}, sampler.usual_speed), *sampler.random_samples(2, 5, 2.0)
 
 

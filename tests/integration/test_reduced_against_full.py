@@ -28,6 +28,7 @@ from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
 from spindle_fem.solvers.prepared_machine import prepare_machine
+from spindle_fem.units import Uncertain
 
 ROOT = Path(__file__).parents[2]
 RPM = np.pi / 30.0
@@ -224,9 +225,16 @@ def test_it_is_found_again_in_the_cache(machine, fast, monkeypatch, tmp_path):
     assert reduced_model_of(far, as_given=True).digest != first.digest
     assert reduced_model_of(near).digest != first.digest
     assert made == [spec, far, near]
+    # heat that differs leaves the range of the coefficients as it was; a smaller error was not checked
+    front, rear = spec.bearing_set
+    warmer = front.model_copy(update={"heat_factor": Uncertain(1.2, front.heat_factor.sigma_log)})
+    heated = spec.model_copy(update={"bearing_set": (warmer, rear)})
+    assert reduced_model_of(heated).digest != building.reduced_digest(heated, options.key(heated))
+    assert made == [spec, far, near]
+    assert reduced_model_of(heated, options=replace(options, error=1e-4)).digest != first.digest
+    assert made == [spec, far, near, heated]
     # the operators of the family are kept too, but for those of one whose geometry differs
     assert meshed == [spec]
-    assert reduced_model_of(spec, options=replace(options, tolerance=1e-2)).digest != first.digest
 
 
 @pytest.fixture(scope="module")

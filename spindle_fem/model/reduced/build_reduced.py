@@ -119,10 +119,16 @@ class _Sampler:
     """Draws sets of coefficients over the range of a machine's uncertain parameters and speeds."""
 
     spec: MachineSpec
-    full: MeshModel
+    full: ThermalModel
     table: CoefficientTable
     sigma: Mapping[str, float]
     options: ReductionOptions
+
+    @classmethod
+    def of(cls, spec: MachineSpec, full: ThermalModel, options: ReductionOptions) -> _Sampler:
+        """Of a machine whose mesh model, or a projection of it, is known."""
+        table = build_coefficient_table(spec, full.contacts, full.gap_radii)
+        return cls(spec, full, table, free_parameters(spec), options)
 
     @property
     def usual_speed(self) -> float:
@@ -176,7 +182,7 @@ class _Sampler:
         return {name: (min(e[name] for e in ends), max(e[name] for e in ends)) for name in ends[0]}
 
 
-def nominal_channel_film(spec: MachineSpec, full: MeshModel, point: OperatingPoint) -> Array:
+def nominal_channel_film(spec: MachineSpec, full: ThermalModel, point: OperatingPoint) -> Array:
     """Film of every coolant cell with the wall at inlet temperature, (n_cells,) W/(m²·K)."""
     if not full.cell_area.size:
         return np.zeros(0)
@@ -196,9 +202,9 @@ def reduced_model_of(
     Parameters
     ----------
     as_given : bool
-        Whether the coefficients stay as the definition gives them; a model of
-        a machine that differs in coefficients only will then do, where its
-        range holds these.
+        Whether the coefficients stay as the definition gives them: a model of
+        a machine that differs in coefficients only will do where its range
+        holds these, otherwise where it holds all that they may become.
     progress : callable
         Called with the name of each stage as it begins.
     """
@@ -207,9 +213,11 @@ def reduced_model_of(
     found = ThermalModel.load(reduced_path(digest))
     if found is not None and found.digest == digest:
         return found
-    for path in family_of(digest) if as_given else []:
+    for path in family_of(digest):
         found = ThermalModel.load(path)
-        if found is not None and _holds(found, spec, chosen.highest_speed_of(spec)):
+        if found is not None and (
+            _holds(found, spec, chosen.highest_speed_of(spec)) if as_given else _covers(found, spec, chosen)
+        ):
             return found
     full = kept_operators(digest)
     if full is None:
@@ -246,6 +254,13 @@ def _holds(model: ThermalModel, spec: MachineSpec, highest_speed: float) -> bool
     return not any(model.outside_range(item) for item in values)
 
 
+def _covers(model: ThermalModel, spec: MachineSpec, options: ReductionOptions) -> bool:
+    """Whether a model was made and checked, as closely as asked, wherever a machine's parameters may go."""
+    ranges = _Sampler.of(spec, model, options).ranges()
+    outside = (model.outside_range({name: pair[end] for name, pair in ranges.items()}) for end in (0, 1))
+    return model.errors["probes"] <= options.error and not any(outside)
+
+
 def build_reduced_model(
     spec: MachineSpec,
     full: MeshModel,
@@ -279,8 +294,7 @@ def build_reduced_model(
         The checks still err after ``ROUNDS`` with snapshots.
     """
     chosen = options or ReductionOptions()
-    table = build_coefficient_table(spec, full.contacts, full.gap_radii)
-    sampler = _Sampler(spec, full, table, free_parameters(spec), chosen)
+    sampler = _Sampler.of(spec, full, chosen)
     nominal = sampler.sample({}, sampler.usual_speed)
     grown = GrowingProjection(full, nominal, None if near is None else (near.fields, near.model))
     wanted = None
