@@ -55,6 +55,25 @@ class Hypothesis:
         return self.fit.keys
 
 
+@dataclass(frozen=True, slots=True)
+class Ranked:
+    """All forms of one set of effects at their places.
+
+    Attributes
+    ----------
+    best : Hypothesis
+        Most probable form.
+    """
+
+    best: Hypothesis
+    probability: float
+
+    @property
+    def fit(self) -> Fit:
+        """Fit of the most probable form."""
+        return self.best.fit
+
+
 def identity(candidates: Iterable[Candidate]) -> frozenset:
     """Identity of a set of candidates: effects, places, forms and numbers of free parameters."""
     return frozenset((c.effect, c.component, c.form, len(c.free)) for c in candidates)

@@ -1,11 +1,16 @@
-"""Whether sets name the same effects, and which may stand for another."""
+"""Which sets name the same effects, which may stand for another, and whether a third effect is needed."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from scipy.special import expit
 
 from spindle_fem.effects.framework.effect import in_intervals
 from spindle_fem.effects.registry import effect_of
+from spindle_fem.inference import tuned
+from spindle_fem.inference.hypothesis import Ranked
 from spindle_fem.inference.hypothesis_fit import Fit
 
 
@@ -50,3 +55,43 @@ def holds(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> b
         if match is not None:
             left.remove(match)
     return not left
+
+
+def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
+    """Sets, a third effect beside two that fit within the errors as probable as held-out readings say.
+
+    Two leave the errors of their laws, which a third may fit: its gain of fitted readings is no evidence.
+    As for a first effect, held-out ones must be twenty to one for it.
+    """
+    shares = {item.fit.keys: item.probability for item in ranked}
+    for item in ranked:
+        pairs = [
+            other
+            for other in ranked
+            if other.fit.keys < item.fit.keys
+            and len(other.fit.keys) == 2
+            and other.fit.reduced_misfit < tuned.EXPLAINED**2
+        ]
+        if not pairs or item.best.heldout is None:
+            continue
+        pair = min(pairs, key=lambda other: other.best.heldout)
+        gain = 0.5 * (pair.best.heldout - item.best.heldout) / tuned.GAIN_DIVISOR
+        both = shares[item.fit.keys] + shares[pair.fit.keys]
+        third = min(shares[item.fit.keys], both * float(expit(gain - tuned.LEAST_HELDOUT_GAIN)))
+        shares[item.fit.keys], shares[pair.fit.keys] = third, both - third
+    found = [replace(item, probability=shares[item.fit.keys]) for item in ranked]
+    return sorted(found, key=lambda item: -item.probability)
+
+
+def as_one(
+    ranked: Sequence[Ranked], overlapping: Mapping[str, frozenset[str]]
+) -> tuple[Ranked, list[Ranked]]:
+    """The first set, and the others, each with the probability of all that name its effects where it does."""
+    found: list[Ranked] = []
+    for item in ranked:
+        like = next((i for i, one in enumerate(found) if are_alike(item.fit, one.fit, overlapping)), None)
+        if like is None:
+            found.append(item)
+        else:
+            found[like] = replace(found[like], probability=found[like].probability + item.probability)
+    return found[0], sorted(found[1:], key=lambda item: -item.probability)

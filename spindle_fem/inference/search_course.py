@@ -54,9 +54,7 @@ def run_search(search: Search) -> list[Hypothesis]:
         worst = best.score - search.reach(size)
         ranked = [h for h in search.ranked() if len(h.keys) == size and h.score > worst]
         search.progress(f"diagnosis: {size + 1} effects")
-        # A third effect is rare: it is looked for only where two leave something.
-        beam = int(size == 1) if search.is_explained(best) else tuned.BEAM
-        for hypothesis in to_extend(search, ranked, beam):
+        for hypothesis in to_extend(search, ranked, _beam(search, best, size)):
             screened, intervals = search.screened(hypothesis.fit)
             search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS)
     improve(search)
@@ -70,6 +68,17 @@ def run_search(search: Search) -> list[Hypothesis]:
         # What was found beside a law may explain all that the law did.
         reduced(search)
     return search.ranked()
+
+
+def _beam(search: Search, best: Hypothesis, size: int) -> int:
+    """How many combinations of a size are extended.
+
+    A third effect beside two that fit within the errors is rare. On a machine with geometry held-out readings
+    say whether it is needed (:func:`with_needed_thirds`); in a network, a coarse picture, they do not.
+    """
+    if not search.is_explained(best):
+        return tuned.BEAM
+    return int(size == 1 or (len(best.keys) == size and not search.problem.predictor.is_network))
 
 
 def _levels_beside(search: Search) -> None:

@@ -13,9 +13,15 @@ from spindle_fem.effects.framework.effect import Candidate, in_intervals
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
-from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis import Hypothesis, Ranked
 from spindle_fem.inference.hypothesis_fit import Fit, amplitude_name
-from spindle_fem.inference.like_sets import are_alike, free_in_time, holds, may_stand_for
+from spindle_fem.inference.like_sets import (
+    as_one,
+    free_in_time,
+    holds,
+    may_stand_for,
+    with_needed_thirds,
+)
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
 
 Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"]
@@ -31,25 +37,6 @@ CONTRADICTED_REASON = (
 )
 # Shift of an uncertain parameter that its prior holds with at least 1 %.
 PRIOR_SIGMAS = float(norm.ppf(0.995))
-
-
-@dataclass(frozen=True, slots=True)
-class Ranked:
-    """All forms of one set of effects at their places.
-
-    Attributes
-    ----------
-    best : Hypothesis
-        Most probable form.
-    """
-
-    best: Hypothesis
-    probability: float
-
-    @property
-    def fit(self) -> Fit:
-        """Fit of the most probable form."""
-        return self.best.fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,6 +263,8 @@ def judge(
     if p_value <= tuned.SIGNIFICANT:
         nothing = min(empty.probability, tuned.STILL_POSSIBLE) if p_value >= tuned.RULED_OUT else 0.0
         ranked = _without(ranked, empty)
+    if coarseness == 1.0:
+        ranked = with_needed_thirds(ranked)
     chosen = ranked[0]
 
     def predicts(item: Ranked) -> bool:
@@ -313,7 +302,7 @@ def judge(
     inexact = max(inexact, unexplained_share(rest), unexplained_share(beyond(chosen.fit) / max(1.0, rest)))
     known_as_one = overlapping or {}
     # Which bearing of a set it is does not matter for the decision; the best represents all.
-    alike, rivals = _as_one(ranked, known_as_one)
+    alike, rivals = as_one(ranked, known_as_one)
     near = [
         item
         for item in rivals
@@ -362,20 +351,6 @@ def judge(
         more,
         rest,
     )
-
-
-def _as_one(
-    ranked: Sequence[Ranked], overlapping: Mapping[str, frozenset[str]]
-) -> tuple[Ranked, list[Ranked]]:
-    """The first set, and the others, each with the probability of all that name its effects where it does."""
-    found: list[Ranked] = []
-    for item in ranked:
-        like = next((i for i, one in enumerate(found) if are_alike(item.fit, one.fit, overlapping)), None)
-        if like is None:
-            found.append(item)
-        else:
-            found[like] = replace(found[like], probability=found[like].probability + item.probability)
-    return found[0], sorted(found[1:], key=lambda item: -item.probability)
 
 
 def _predicts(

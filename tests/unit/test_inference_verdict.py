@@ -387,24 +387,6 @@ def test_a_bearing_and_its_set_are_one_place_for_a_decision():
     assert verdict(found[0], found[1], other, overlapping=group).verdict == "ambiguous"
 
 
-def test_rivals_at_places_that_count_as_one_are_one_rival():
-    places = ("front_bearings", "F1", "F2")
-    group = dict.fromkeys(places, frozenset(places))
-    found = [hypothesis(misfit=1400.0), hypothesis(PRELOAD, misfit=400.0)]
-    each = 0.7 * tuned.NEAR_PROBABILITY
-    found += [
-        hypothesis(replace(CHURNING, component=place), misfit=400.0, log_prior=float(np.log(each)))
-        for place in places[:2]
-    ]
-    like = {"apart": lambda one, other: 0.0, "overlapping": group}
-    assert rank(found)[1].probability == pytest.approx(each, rel=0.05)
-    together = verdict(*found, **like)
-    assert (together.verdict, together.reason) == ("ambiguous", NEAR_REASON)
-    (rival,) = together.alternatives
-    assert rival.probability == pytest.approx(2.0 * each * together.chosen.probability, rel=0.05)
-    assert verdict(*found[:3], **like).verdict == "missing_physics"
-
-
 def test_a_fit_that_stays_above_the_noise_leaves_room_for_something_else():
     found = verdict(hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=3000.0, reduced=4.0))
     assert found.other > 0.1

@@ -42,3 +42,23 @@ def test_a_state_that_gains_a_little_every_time_is_not_followed_for_ever(monkeyp
     search = Ever(gain)
     search_course._beside(search)
     assert search.rounds == rounds
+
+
+@pytest.mark.parametrize(
+    ("explained", "members", "size", "is_network", "beam"),
+    [
+        (False, "ab", 2, False, tuned.BEAM),
+        (False, "ab", 2, True, tuned.BEAM),
+        (True, "", 1, True, 1),
+        (True, "a", 1, False, 1),
+        (True, "a", 2, False, 0),
+        (True, "ab", 2, False, 1),
+        (True, "ab", 2, True, 0),
+    ],
+)
+def test_a_third_effect_beside_two_that_fit_is_looked_for_with_geometry(
+    explained, members, size, is_network, beam
+):
+    problem = SimpleNamespace(predictor=SimpleNamespace(is_network=is_network))
+    search = SimpleNamespace(is_explained=lambda best: explained, problem=problem)
+    assert search_course._beam(search, SimpleNamespace(keys=frozenset(members)), size) == beam

@@ -1,0 +1,53 @@
+"""Sets that are one for a decision, and effects that have to be needed beside others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.verdict import NEAR_REASON, rank
+from tests.support.made_hypotheses import CHURNING, OFFSET, PRELOAD, hypothesis, verdict
+
+
+def test_a_third_beside_two_that_fit_within_the_errors_is_as_probable_as_held_out_readings_say():
+    nothing = replace(hypothesis(misfit=2000.0), heldout=900.0)
+    pair = replace(hypothesis(PRELOAD, CHURNING, misfit=400.0), heldout=500.0)
+    worse = replace(hypothesis(PRELOAD, OFFSET, misfit=420.0), heldout=700.0)
+
+    def said(gain, **others):
+        """Gain of held-out readings beyond twenty to one, as it counts."""
+        heldout = 500.0 - 2.0 * tuned.GAIN_DIVISOR * (tuned.LEAST_HELDOUT_GAIN + gain)
+        triple = replace(hypothesis(PRELOAD, CHURNING, OFFSET, misfit=300.0), heldout=heldout)
+        return verdict(nothing, pair, triple, worse, calibrated=True, **others)
+
+    assert [len(said(gain).chosen.fit.keys) for gain in (-1.0, 1.0)] == [2, 3]
+    faint, clear = said(-1.0), said(4.0)
+    assert faint.evidence == pytest.approx(1.0 / (1.0 + np.exp(-1.0)), abs=0.01)
+    assert [len(item.fit.keys) for item in faint.alternatives] == [3]
+    # The two are sure, whether there is a third or not.
+    assert faint.verdict == "missing_physics"
+    assert clear.evidence > 0.98
+    # Two that leave more than errors need a third; likelihoods of a network are another matter.
+    left = replace(pair, fit=replace(pair.fit, misfit=1.1 * tuned.EXPLAINED**2 * len(pair.fit.residual)))
+    triple = replace(hypothesis(PRELOAD, CHURNING, OFFSET, misfit=300.0), heldout=500.0)
+    assert len(verdict(nothing, left, triple, calibrated=True).chosen.fit.keys) == 3
+    assert len(said(-1.0, coarseness=1.1).chosen.fit.keys) == 3
+
+
+def test_rivals_at_places_that_count_as_one_are_one_rival():
+    places = ("front_bearings", "F1", "F2")
+    group = dict.fromkeys(places, frozenset(places))
+    found = [hypothesis(misfit=1400.0), hypothesis(PRELOAD, misfit=400.0)]
+    each = 0.7 * tuned.NEAR_PROBABILITY
+    found += [
+        hypothesis(replace(CHURNING, component=place), misfit=400.0, log_prior=float(np.log(each)))
+        for place in places[:2]
+    ]
+    like = {"apart": lambda one, other: 0.0, "overlapping": group}
+    assert rank(found)[1].probability == pytest.approx(each, rel=0.05)
+    together = verdict(*found, **like)
+    assert (together.verdict, together.reason) == ("ambiguous", NEAR_REASON)
+    (rival,) = together.alternatives
+    assert rival.probability == pytest.approx(2.0 * each * together.chosen.probability, rel=0.05)
+    assert verdict(*found[:3], **like).verdict == "missing_physics"
