@@ -227,7 +227,8 @@ class Study:
     """Fits of one case; responses are every ``EVERY`` steps of the drive.
 
     ``always`` acts in every run; ``channels`` are those that are recorded; ``earlier`` what the calibrations
-    truly read, if this model would read something else.
+    truly read, if this model would read something else. ``loose`` makes, from sizes in standard
+    deviations, laws by which the machine may differ from what is stated of it.
     """
 
     def __init__(
@@ -239,9 +240,10 @@ class Study:
         noise: Noise,
         always: tuple[Law, ...] = (),
         channels: tuple[int, ...] = tuple(range(6)),
+        loose: tuple[Callable[[float], Law], ...] = (),
     ) -> None:
         self.model, self.plan, self.as_built, self.noise = model, plan, as_built, noise
-        self.always, self.channels = always, list(channels)
+        self.always, self.channels, self.loose = always, list(channels), loose
         self.shared: dict[bytes, tuple] = {}
         self.left = np.zeros(0)
         self.drives = [p.drive.every(EVERY) for p in (plan, calibration) if p is not None]
@@ -264,9 +266,13 @@ class Study:
                     ]
                 )
             )
+        for make in loose:
+            runs = [run(model, d, as_built, (*always, make(0.1))).readings for d in self.drives]
+            columns.append(self._stack([r - p for r, p in zip(runs, self.plain, strict=True)]))
+        self.offset = np.concatenate([self.offset, np.zeros(len(loose))])
         self.jacobian = np.stack(columns, axis=1) / 0.1
         self.white = self._whiten(self.jacobian)
-        self.q, self.r = np.linalg.qr(np.vstack([self.white, np.eye(len(self.names))]))
+        self.q, self.r = np.linalg.qr(np.vstack([self.white, np.eye(self.offset.size)]))
         prior = np.concatenate([np.zeros(self.white.shape[0]), -self.offset])
         rest = prior - self.q @ (self.q.T @ prior)
         self._null = float(rest @ rest)
@@ -323,7 +329,7 @@ class Study:
         self, change: NDArray[np.float64], extra: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], float]:
         """Fit parameters and the extra columns (n, k); returns the solution and chi squared."""
-        count = len(self.names)
+        count = self.offset.size
         b = np.concatenate([self._whiten(change[:, None])[:, 0], -self.offset])
         rest = b - self.q @ (self.q.T @ b)
         amplitudes = np.zeros(extra.shape[1])
@@ -375,7 +381,8 @@ class Study:
 
         What the best of it leaves stays in ``left``.
         """
-        position = np.zeros(len(self.names) + (mimic is not None))
+        count = self.offset.size
+        position = np.zeros(count + (mimic is not None))
         best = (np.inf, np.inf)
         reach = np.ones_like(position)
         anchor, step, anchor_change = position, np.zeros_like(position), np.zeros(0)
@@ -385,16 +392,18 @@ class Study:
             built = dict(self.as_built)
             for name, x in zip(self.names, position, strict=False):
                 built = perturbed(built, name, float(np.clip(x, -8, 8)))
+            moved = position[len(self.names) : count]
+            off = tuple(make(float(x)) for make, x in zip(self.loose, moved, strict=True))
             effects = [mimic.make(position[-1])] if mimic is not None else []
-            guess = [self.simulate(effects, built if position.any() else None)]
-            guess += [run(self.model, d, built, self.always).readings for d in self.drives[1:]]
+            guess = [self.simulate([*off, *effects], built if position.any() else None)]
+            guess += [run(self.model, d, built, (*self.always, *off)).readings for d in self.drives[1:]]
             change = self._stack(
                 [truth - guess[0], *[p - g for p, g in zip(self.earlier, guess[1:], strict=True)]]
             )
             chi2 = np.inf
             if np.isfinite(change).all():
                 rest = self._whiten(change[:, None])[:, 0]
-                pull = position[: len(self.names)] + self.offset
+                pull = position[:count] + self.offset
                 chi2 = max(0.0, float(rest @ rest + pull @ pull) - self._null)
             if not chi2 < best[1]:
                 reach *= 0.4
@@ -408,7 +417,7 @@ class Study:
             if gain < CONVERGED:
                 break
             saved = self.offset
-            self.offset = saved + anchor[: len(self.names)]
+            self.offset = saved + anchor[:count]
             step, _ = self.solve(
                 anchor_change, column[:, None] if mimic is not None else np.empty((change.size, 0))
             )

@@ -75,6 +75,21 @@ class HeatScale(Law):
 
 
 @dataclass(slots=True)
+class HeatShape(Law):
+    """Heat of some bearings off by a share over speed, a cosine of ``turns`` half waves up to ``highest``."""
+
+    where: str
+    share: float
+    turns: int
+    highest: float
+
+    def act(self, moment: Moment) -> None:
+        """Change the moment."""
+        phase = np.pi * self.turns * abs(moment.speed) / self.highest
+        moment.bearing[list(SETS[self.where])] *= 1.0 + self.share * np.cos(phase)
+
+
+@dataclass(slots=True)
 class HeatSplit(Law):
     """Share of the inner ring changed."""
 

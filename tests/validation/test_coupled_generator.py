@@ -9,9 +9,13 @@ import pytest
 from spindle_fem.definition.load import load_machine
 from spindle_fem.recordings.align import read_recording
 from validation.ball_set import FRONT, REAR, BallSet, Warmth
-from validation.generate_coupled import PLACES, PRELOAD, SIDES, displacement, make_case
+from validation.cycles import draw_drive
+from validation.generate_coupled import PLACES, PRELOAD, SIDES, displacement, make_case, stated_uncertainty
+from validation.identify import Study
+from validation.laws import HeatShape
+from validation.recorder import Noise
 from validation.reduction import load_reduced
-from validation.stepping import Path
+from validation.stepping import Path, nominal_machine
 
 
 def front(clearance):
@@ -87,3 +91,13 @@ def test_a_case_can_be_read_and_says_what_it_conceals(reduced, tmp_path):
     consistent = make_case(reduced, tmp_path, 91, 10, identify=False)
     assert consistent["effects"] == []
     assert json.loads((tmp_path / "answers" / "case_0010.json").read_text())["family"] == "temperatures alone"
+
+
+def test_what_a_table_of_heat_leaves_open_takes_up_heat_that_is_off_over_speed(reduced):
+    plan, noise = draw_drive(np.random.default_rng(2), cycle="staircase"), Noise(0.05, 0.03, 1500.0)
+    off, left = HeatShape("F", 0.08, 2, 4500.0), []
+    for loose in ((), stated_uncertainty()):
+        study = Study(reduced, plan, None, nominal_machine(), noise, loose=loose)
+        left.append(study.fit_through_model(study.simulate([off]), None, np.empty((0, 0)))[0])
+    assert left[0] > 1.0
+    assert left[1] < 0.3 * left[0]
