@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -174,6 +175,10 @@ class ThermalPreload(Effect):
         ),
         makes=Makes("warmer", probe="SP01", at="front_bearings"),
     )
+
+    # µm; two mechanics of one set find clearances so far apart in the same readings (26 cases of
+    # ``validation.generate_coupled --seed 141``: 13 to one side, 8 about that).
+    law_shift = MappingProxyType({"outer_clearance": 10.0})
 
     def in_definition(self, spec: MachineSpec) -> bool:
         """Machines whose heat follows thermal expansion."""
