@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import itertools
 import pickle
 import weakref
 from collections import deque
@@ -211,7 +210,7 @@ class WorkerPool:
         BadInputError
             Dask is not installed, or no scheduler responds.
         WorkerDiedError
-            A worker process ended before its time; names the jobs that were running.
+            Two worker processes ended before their time on one job; names it.
         """
         names = _names(jobs, names)
         if self._scheduler is not None:
@@ -250,17 +249,37 @@ def _answer_of(future: Any, name: str) -> Any:
 
 
 def _as_they_come(jobs: Sequence[Job], names: Sequence[str], number: int) -> Iterator[tuple[int, Any]]:
-    """Answers of worker processes; no more jobs are sent than can run, so that those running are known."""
+    """Answers of worker processes; no more jobs are sent than can run, so that those running are known.
+
+    Those that run when a process dies are done again, each alone: the one that a process dies of is then known.
+    """
     from concurrent.futures import FIRST_COMPLETED, wait
 
-    executor, left = _executor(number), enumerate(jobs)
-    running = {_submit(executor, job): place for place, job in itertools.islice(left, number)}
-    while running:
-        finished, _ = wait(running, return_when=FIRST_COMPLETED)
-        involved = "; ".join(names[place] for place in running.values())
-        answers = [(running.pop(future), _answer_of(future, involved)) for future in finished]
-        running |= {_submit(executor, job): place for place, job in itertools.islice(left, len(answers))}
+    from joblib.externals.loky import BrokenProcessPool
+
+    left, running, again, answers = deque(range(len(jobs))), {}, [], []
+    while left or running or again or answers:
+        if again and not running and not answers:
+            place = again.pop(0)
+            yield place, _answer_of(_submit(_executor(number), jobs[place]), names[place])
+            continue
+        try:
+            while left and not again and len(running) < number:
+                running[_submit(_executor(number), jobs[left[0]])] = left[0]
+                left.popleft()
+        except BrokenProcessPool:
+            _executor.cache_clear()
         yield from answers
+        answers = []
+        finished, _ = wait(running, return_when=FIRST_COMPLETED)
+        for future in finished:
+            place = running.pop(future)
+            if isinstance(future.exception(), BrokenProcessPool):
+                # The next pool gets new processes.
+                _executor.cache_clear()
+                again.append(place)
+            else:
+                answers.append((place, future.result()))
 
 
 def _on_cluster(jobs: Sequence[Job], names: Sequence[str], address: str) -> Iterator[tuple[int, Any]]:

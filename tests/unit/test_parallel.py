@@ -38,6 +38,13 @@ def die_beside(parent):
     return parent
 
 
+def die_once(mark):
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "done again"
+
+
 def refuse():
     raise BadInputError("work", "it was refused.")
 
@@ -106,9 +113,16 @@ def test_an_error_of_a_job_is_raised_here_whoever_ran_it():
             ask()
 
 
+def test_what_a_worker_died_on_is_done_again(tmp_path):
+    jobs = [partial(len, "ab"), partial(die_once, tmp_path / "died"), *[partial(len, "abc")] * 4]
+    found = list(WorkerPool(2).stream(jobs))
+    assert sorted(place for place, _ in found) == list(range(6))
+    assert dict(found) == {0: 2, 1: "done again", 2: 3, 3: 3, 4: 3, 5: 3}
+
+
 def test_a_worker_that_dies_is_an_error_that_names_its_job():
     pool, job = WorkerPool(2), partial(die_beside, os.getpid())
-    with pytest.raises(WorkerDiedError, match="design 8: its worker process ended before its time"):
+    with pytest.raises(WorkerDiedError, match="^design 8: its worker process ended before its time"):
         list(pool.stream([partial(len, "a"), job, job], ["design 7", "design 8", "design 8"]))
     with pytest.raises(WorkerDiedError, match=r"^the fit: "):
         pool.start(job, "the fit")()
