@@ -251,7 +251,7 @@ def _answer_of(future: Any, name: str) -> Any:
 def _as_they_come(jobs: Sequence[Job], names: Sequence[str], number: int) -> Iterator[tuple[int, Any]]:
     """Answers of worker processes; no more jobs are sent than can run, so that those running are known.
 
-    Those that run when a process dies are done again, each alone: the one that a process dies of is then known.
+    Those that run when a process dies are done again, each alone, so that the one it dies of is known.
     """
     from concurrent.futures import FIRST_COMPLETED, wait
 

@@ -122,7 +122,7 @@ def test_what_a_worker_died_on_is_done_again(tmp_path):
 
 def test_a_worker_that_dies_is_an_error_that_names_its_job():
     pool, job = WorkerPool(2), partial(die_beside, os.getpid())
-    with pytest.raises(WorkerDiedError, match="^design 8: its worker process ended before its time"):
+    with pytest.raises(WorkerDiedError, match=r"^design 8: its worker process ended before its time"):
         list(pool.stream([partial(len, "a"), job, job], ["design 7", "design 8", "design 8"]))
     with pytest.raises(WorkerDiedError, match=r"^the fit: "):
         pool.start(job, "the fit")()
