@@ -37,13 +37,21 @@ def run(
         bool,
         typer.Option("--estimate-mesh-error", help="Solve on a second, coarser mesh and report the change."),
     ] = False,
+    solid_growth: Annotated[
+        bool, typer.Option("--solid-growth", help="Also work out growth in three dimensions, on the mesh.")
+    ] = False,
 ) -> None:
     """Geometry, mesh, heat, films, solve, pictures, report."""
     from spindle_fem.commands.console import print_run
     from spindle_fem.commands.machine_commands import run_machine
 
     summary = run_machine(
-        machine, output, overrides=set_ or (), estimate_mesh_error=estimate_mesh_error, progress=not as_json
+        machine,
+        output,
+        overrides=set_ or (),
+        estimate_mesh_error=estimate_mesh_error,
+        solid_growth=solid_growth,
+        progress=not as_json,
     )
     print_json(summary) if as_json else print_run(summary, output)
 

@@ -26,6 +26,7 @@ def run_machine(
     *,
     overrides: Iterable[str] = (),
     estimate_mesh_error: bool = False,
+    solid_growth: bool = False,
     progress: bool = False,
 ) -> dict[str, Any]:
     """Solve a machine and write summary, fields, pictures and report.
@@ -41,6 +42,9 @@ def run_machine(
     estimate_mesh_error : bool
         Solve on a second mesh with elements half as large again, and report
         how far the probes move.
+    solid_growth : bool
+        Work out growth in three dimensions too: ``growth.three_dimensional`` of the summary and
+        ``displacement`` of ``fields.vtu``.
     progress : bool
         Show the stage on the terminal.
 
@@ -75,6 +79,9 @@ def run_machine(
         if estimate_mesh_error:
             tell("second mesh")
             result = estimate_refinement(result, spec)
+        if solid_growth:
+            tell("growth in three dimensions")
+            result = result.with_solid_growth()
         write_outputs(result, place, started=started, notify=tell, helpers=helpers)
     require_checks(result.checks, spec.name)
     return read_content(place / "summary.json", SUMMARY_SCHEMA, "run")

@@ -102,7 +102,8 @@ def heat_flux(
 def write_fields(result: ThermalResult, path: str | Path) -> Path:
     """Write ``fields.vtu``.
 
-    Point data: ``temperature_degC``, ``heat_flux_W_m2``. Cell data:
+    Point data: ``temperature_degC``, ``heat_flux_W_m2``; ``displacement`` (m) of a result with growth in
+    three dimensions. Cell data:
     ``part_id`` and ``surface_id`` (−1 on volume elements); field data
     ``part.NAME`` and ``surface.NAME`` hold the number of each name. On faces
     with a film ``film_coefficient_W_m2K`` and ``fluid_temperature_degC``, NaN
@@ -120,12 +121,15 @@ def write_fields(result: ThermalResult, path: str | Path) -> Path:
             film[first : first + count] = result.film_coefficient[name]
             fluid[first : first + count] = result.fluid_temperature[name] - ZERO_CELSIUS_K
         first += count
+    moved = result.solid_growth
+    shift = {} if moved is None else {"displacement": moved.displacement.astype(np.float32)}
     return write_tagged_vtu(
         mesh,
         path,
         point_data={
             "temperature_degC": (result.temperature - ZERO_CELSIUS_K).astype(np.float32),
             "heat_flux_W_m2": heat_flux(mesh, result.temperature, conductivity).astype(np.float32),
+            **shift,
         },
         cell_data={"film_coefficient_W_m2K": film, "fluid_temperature_degC": fluid},
     )

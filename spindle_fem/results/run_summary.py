@@ -20,7 +20,10 @@ from spindle_fem.results.thermal_result import (
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
-    from spindle_fem.model.elastic.machine_growth import Growth
+    from collections.abc import Mapping
+
+    from spindle_fem.model.elastic.machine_growth import Growth, Side
+    from spindle_fem.model.elastic.solid_growth import SolidGrowth
 
 SUMMARY_SCHEMA = "spindle-fem/summary/1"
 _PACKAGES = (
@@ -100,7 +103,7 @@ def build_summary(
                 "max_degC": result.temperature_maximum - ZERO_CELSIUS_K,
                 "max_at_mm": maximum_mm,
             },
-            **({} if growth is None else _growth(growth)),
+            **({} if growth is None else _growth(growth, result.solid_growth)),
             "displacements": {name: 1e6 * value for name, value in displacements.items()},
             **({} if result.equilibrium is None else {"equilibrium": _equilibrium(result.equilibrium)}),
             "joints": {name: {"heat_W": value} for name, value in result.heat_flows.items()},
@@ -183,34 +186,49 @@ def _circuit(circuit: CircuitResult) -> dict[str, Any]:
     }
 
 
-def _growth(growth: Growth) -> dict[str, Any]:
+def _growth(growth: Growth, solid: SolidGrowth | None) -> dict[str, Any]:
     """Blocks ``growth`` and ``fits``, lengths in µm."""
-    up, across = growth.nose_radial or (math.nan, math.nan)
-    tilt_up, tilt_across = growth.nose_tilt or (math.nan, math.nan)
-    raceways: dict[str, dict[str, float]] = {}
-    seats: dict[str, dict[str, float]] = {}
     fits: dict[str, dict[str, dict[str, float]]] = {}
     for (bearing, side), state in growth.seats.items():
-        ring = "inner" if side == "shaft" else "outer"
-        raceways.setdefault(bearing, {})[f"{ring}_um"] = 1e6 * state.raceway_growth
-        seats.setdefault(bearing, {})[f"{side}_um"] = 1e6 * state.seat_growth
         fits.setdefault(bearing, {})[side] = {
             "pressure_MPa": 1e-6 * state.pressure,
             "gap_um": 1e6 * state.gap,
         }
+    seats = {key: state.seat_growth for key, state in growth.seats.items()}
+    raceways = {key: state.raceway_growth for key, state in growth.seats.items()}
     return {
         "growth": {
-            "nose_axial_um": None if growth.nose_axial is None else 1e6 * growth.nose_axial,
-            "nose_radial_up_um": 1e6 * up,
-            "nose_radial_across_um": 1e6 * across,
-            "nose_tilt_up_urad": 1e6 * tilt_up,
-            "nose_tilt_across_urad": 1e6 * tilt_across,
-            "raceways": raceways,
-            "seats": seats,
+            **_shape(growth, seats, raceways),
             "spacers": {name: {"length_um": 1e6 * value} for name, value in growth.spacers.items()},
+            **({} if solid is None else {"three_dimensional": _shape(solid, solid.seats, solid.raceways)}),
         },
         "fits": fits,
     }
+
+
+def _shape(
+    growth: Growth | SolidGrowth,
+    seats: Mapping[tuple[str, Side], float],
+    raceways: Mapping[tuple[str, Side], float],
+) -> dict[str, Any]:
+    """Motions of the nose, and growth of seats and raceways by bearing."""
+    up, across = growth.nose_radial or (math.nan, math.nan)
+    tilt_up, tilt_across = growth.nose_tilt or (math.nan, math.nan)
+    found: dict[str, Any] = {
+        "nose_axial_um": None if growth.nose_axial is None else 1e6 * growth.nose_axial,
+        "nose_radial_up_um": 1e6 * up,
+        "nose_radial_across_um": 1e6 * across,
+        "nose_tilt_up_urad": 1e6 * tilt_up,
+        "nose_tilt_across_urad": 1e6 * tilt_across,
+        "raceways": {},
+        "seats": {},
+    }
+    for (bearing, side), value in raceways.items():
+        ring = "inner" if side == "shaft" else "outer"
+        found["raceways"].setdefault(bearing, {})[f"{ring}_um"] = 1e6 * value
+    for (bearing, side), value in seats.items():
+        found["seats"].setdefault(bearing, {})[f"{side}_um"] = 1e6 * value
+    return found
 
 
 def _equilibrium(found: Equilibrium) -> dict[str, Any]:

@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.errors import SpecError
 from spindle_fem.results.presented import Presented
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
     from spindle_fem.model.elastic.deformed_shape import BodyShape
     from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
+    from spindle_fem.model.elastic.solid_growth import SolidGrowth
     from spindle_fem.operation.bearing_heat import BearingTemperatures
     from spindle_fem.validity import CodedWarning
 
@@ -196,6 +198,8 @@ class ThermalResult(Presented):
         Where the solution made one already.
     equilibrium : Equilibrium or None
         For a machine with preloaded bearings, if requested.
+    solid_growth : SolidGrowth or None
+        Growth in three dimensions, where :meth:`with_solid_growth` worked it out.
     """
 
     spec: MachineSpec
@@ -226,6 +230,7 @@ class ThermalResult(Presented):
     bearing_temperatures: Mapping[str, BearingTemperatures] = field(default_factory=dict)
     growth_model: GrowthModel | None = None
     equilibrium: Equilibrium | None = None
+    solid_growth: SolidGrowth | None = None
 
     @cached_property
     def growth(self) -> Growth | None:
@@ -289,6 +294,28 @@ class ThermalResult(Presented):
             rows["coolant"] = f"{self.coolant.heat:.0f} W"
         rows["heat in"] = f"{self.energy.heat_in:.1f} W, imbalance {self.energy.imbalance_relative:.0e}"
         return rows
+
+    def with_solid_growth(self) -> Self:
+        """Copy with the growth in three dimensions, on the mesh of the temperatures; takes some seconds.
+
+        Raises
+        ------
+        SpecError
+            A machine without bearings, shaft or housing.
+        GeometryError
+            A body in pieces, or a part that touches no other.
+        """
+        from spindle_fem.model.elastic.machine_bodies import carries_rings
+        from spindle_fem.model.elastic.solid_growth import solid_growth
+
+        if not carries_rings(self.spec):
+            raise SpecError(
+                self.spec.name,
+                "has no bearings between a shaft and a housing.",
+                "Growth in three dimensions places the bodies by them.",
+            )
+        found = solid_growth(self._elastic, self.mesh, self.temperature, self.speed, self._ball_forces)
+        return replace(self, solid_growth=found)
 
     def with_timings(self, timings: Mapping[str, float]) -> ThermalResult:
         """Copy with the seconds of each stage."""

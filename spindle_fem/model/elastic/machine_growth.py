@@ -154,7 +154,7 @@ class GrowthModel:
         self.spec = spec
         self.bodies = machine_bodies(spec) if bodies is None else bodies
 
-        self._size = mesh.n_corners if order == 1 else len(mesh.points)
+        self.unknowns = mesh.n_corners if order == 1 else len(mesh.points)
         housing = self.bodies.bodies.get(self.bodies.housing)
         self.sights = () if housing is None else sensor_sights(spec, mesh, housing)
         self.fields = {
@@ -178,12 +178,12 @@ class GrowthModel:
             for group, bearing in spec.bearings
             for force in [_assembled_radial_force(spec, group, bearing)]
         }
-        self.seat_rows = np.zeros((len(self.rings), self._size))
+        self.seat_rows = np.zeros((len(self.rings), self.unknowns))
         for name, outputs in self.seating.carriers.items():
             self.seat_rows[self.seating.seats_on(name)] = self._rows(outputs)
         ring_rows = np.array([self._rows(ring.outputs) for ring in self.rings])
         self.thermal_rows = self.seating.thermal_rows(
-            self.seat_rows, ring_rows.reshape(len(self.rings), 2, self._size)
+            self.seat_rows, ring_rows.reshape(len(self.rings), 2, self.unknowns)
         )
 
     def _spacers(self, mesh: TaggedMesh, order: int) -> Iterator[tuple[str, Spacer]]:
@@ -203,7 +203,7 @@ class GrowthModel:
     def _carrier(self, name: str) -> tuple[BodyOutputs, Array] | None:
         body = self.bodies.bodies[name]
         outputs = {}
-        forward = self._forward(name)
+        forward = self._forward_of(name)
         if forward is not None:
             outputs["forward"] = forward
         for sight in self.sights:
@@ -213,7 +213,7 @@ class GrowthModel:
         solved = BodyOutputs.of(body, outputs)
         return solved, self._rows(solved)
 
-    def _forward(self, name: str) -> Array | None:
+    def _forward_of(self, name: str) -> Array | None:
         """Forward shift of the nose from its bearing (shaft), or of the bearing from the flange (housing)."""
         layout, body = Layout(self.spec, set()), self.bodies.bodies[name]
         held = self.holding_seat(name)
@@ -253,7 +253,7 @@ class GrowthModel:
     def sensor_rows(self) -> tuple[Array, Array]:
         """Reading of every sensor by a kelvin of each unknown (n, n_unknowns), and at 1 rad/s (n,), m s²."""
         nose = min(segment.z[0] for segment in Layout(self.spec, set()).shaft.segment)
-        rows, spins = np.zeros((len(self.sights), self._size)), np.zeros(len(self.sights))
+        rows, spins = np.zeros((len(self.sights), self.unknowns)), np.zeros(len(self.sights))
         for index, sight in enumerate(self.sights):
             for name, (outputs, weights) in self.carriers.items():
                 place = outputs.names.index(sight.key)
@@ -302,7 +302,7 @@ class GrowthModel:
         """Rows (4, n_unknowns): nose up, across; tilt up, across. Empty if they are not defined."""
         layout, sets = Layout(self.spec, set()), self.spec.bearing_set
         if len(sets) < 2 or not self.bodies.shaft or layout.flange_ends() is None:
-            return np.zeros((0, self._size))
+            return np.zeros((0, self.unknowns))
         body, (back, mount, turn) = self._bent_housing, self._frame
         places, shifts = [], []
         for group in (sets[0], sets[-1]):
@@ -361,7 +361,7 @@ class GrowthModel:
         radial, tilt = (tuple(pair) for pair in bent.reshape(2, 2).tolist()) if len(bent) else (None, None)
         rise = temperature - self.assembly_temperature
         spacers = {name: float(spacer.length @ rise) for name, spacer in self.spacers.items()}
-        return Growth(found, self._nose(temperature), radial, tilt, spacers)
+        return Growth(found, self._nose(temperature, speed), radial, tilt, spacers)
 
     def pressures(self, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]) -> Array:
         """Pressures on the seat and on the raceway of every ring, (2, n) Pa; arguments as of :meth:`at`."""
@@ -402,35 +402,41 @@ class GrowthModel:
             ]
         )
 
-    def _nose(self, temperature: Array) -> float | None:
-        row = self._forward_row
-        return None if row is None else float(row @ (temperature - self.assembly_temperature))
+    def _nose(self, temperature: Array, speed: float) -> float | None:
+        if self._forward is None:
+            return None
+        row, spin = self._forward
+        return float(row @ (temperature - self.assembly_temperature) + spin * speed**2)
 
     @cached_property
-    def _forward_row(self) -> Array | None:
-        """Forward shift of the nose by each temperature, (n_unknowns,) m/K; None where it is not defined."""
-        forward = [
-            rows[outputs.names.index("forward")]
-            for outputs, rows in self.carriers.values()
-            if "forward" in outputs.names
-        ]
-        return sum(forward) if forward and len(forward) == len(self.seating.carriers) else None
+    def _forward(self) -> tuple[Array, float] | None:
+        """Forward shift of the nose by each temperature, (n_unknowns,) m/K, and at 1 rad/s, m s².
+
+        None where it is not defined.
+        """
+        known = [pair for pair in self.carriers.values() if "forward" in pair[0].names]
+        if not known or len(known) < len(self.seating.carriers):
+            return None
+        turning, _ = self.carriers[self.bodies.shaft]
+        rows = sum(rows[outputs.names.index("forward")] for outputs, rows in known)
+        return rows, float(turning.by_spin[turning.names.index("forward")])
 
     @cached_property
     def motions(self) -> Motions:
         """Everything that a machine shows of its growth from outside: the nose, then every sensor."""
-        names, blocks = [], []
-        if self._forward_row is not None:
-            names, blocks = [NOSE[0]], [self._forward_row[None]]
+        names, blocks, spins = [], [], np.zeros(0)
+        if self._forward is not None:
+            row, spin = self._forward
+            names, blocks, spins = [NOSE[0]], [row[None]], np.array([spin])
         if len(self.bending):
             names, blocks = [*names, *NOSE[1:]], [*blocks, self.bending]
-        seen, spins = self.sensor_rows if self.sights else (np.zeros((0, self._size)), np.zeros(0))
+            spins = np.append(spins, np.zeros(len(self.bending)))
+        seen, of_seen = self.sensor_rows if self.sights else (np.zeros((0, self.unknowns)), np.zeros(0))
         rows = np.concatenate([*blocks, seen])
-        still = np.zeros(len(names))
         return Motions(
             tuple(names),
             tuple(sight.name for sight in self.sights),
             rows,
             rows.sum(axis=1) * self.assembly_temperature,
-            np.concatenate((still, spins)),
+            np.concatenate((spins, of_seen)),
         )
