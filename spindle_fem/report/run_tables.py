@@ -302,7 +302,9 @@ def nose_table(summary: Mapping[str, Any]) -> Table:
         if growth[key] is not None
     ]
     columns = (column("nose"), column("value", number=True), column("unit"))
-    return Table(columns, rows_of(entries), "Displacement of the nose since assembly, by temperature.")
+    return Table(
+        columns, rows_of(entries), "Displacement of the nose since assembly, by temperature and rotation."
+    )
 
 
 def joint_table(summary: Mapping[str, Any]) -> Table:

@@ -106,7 +106,7 @@ def test_pressure_in_the_bore_by_lame() -> None:
 
 
 def test_radial_gradient_converges_to_the_hollow_cylinder() -> None:
-    """Mean growth of the bore by T linear in r, free ends far away from no restraint: u(a) of the field's mean."""
+    """Mean growth of the bore by T linear in r with free ends: u(a) of the field's mean."""
     hot = 50.0
     moment = hot * (OUTSIDE**3 / 3.0 - INSIDE * OUTSIDE**2 / 2.0 + INSIDE**3 / 6.0) / (OUTSIDE - INSIDE)
     exact = 2.0 * 12e-6 * INSIDE / (OUTSIDE**2 - INSIDE**2) * moment

@@ -82,7 +82,7 @@ class Facets:
         return found
 
     def rigid_fit(self, wanted: Array) -> Array:
-        """Rigid motion (6,), shift and turn, that comes nearest to ``wanted`` (n, 3) [m] in the area's mean."""
+        """Rigid motion (6,), shift and turn, nearest to ``wanted`` (n, 3) [m] in the area's mean."""
         motions = rigid_motions(self.points)
         root = np.sqrt(self.weights)
         rows = (motions * root[:, None, None]).reshape(-1, 6)
@@ -127,7 +127,9 @@ def on_face(mesh: TaggedMesh, parts: Sequence[str], face: Face) -> Facets:
     facets = facets[lie_on(mesh.points[facets[:, :3]], face)]
     if not len(facets):
         raise GeometryError(
-            ", ".join(parts), f"the mesh has no facet at z {face.z}, r {face.r} m.", "Give a face of the body."
+            ", ".join(parts),
+            f"the mesh has no facet at z {face.z}, r {face.r} m.",
+            "Give a face of the body.",
         )
     return Facets(mesh.points, facets)
 

@@ -7,8 +7,8 @@ for every test function v,
         = ∫ (3Λ + 2μ) α (T − T0) div v dV + ω² ∫ ρ (x v_x + y v_y) dV + ∫ t·v dA
 
 with Lamé's constants Λ and μ. Each is a form of scikit-fem and assembles by itself, on
-``Basis(mesh, ElementVector(ElementTetP2()))``. :mod:`spindle_fem.model.elastic.solid_body` integrates the same
-with kernels.
+``Basis(mesh, ElementVector(ElementTetP2()))``. :mod:`spindle_fem.model.elastic.solid_body` integrates the
+same with kernels.
 
 Source: Zienkiewicz, Taylor, The Finite Element Method, vol. 1, chapter on linear elasticity.
 """

@@ -37,19 +37,19 @@ class SolidGrowth:
         Of every node of the thermal mesh; the back of the flange stays in its place.
     seats, raceways : mapping of (bearing, side) to float, [m]
         Mean shift outwards of shaft or housing under the ring, and of the ring's raceway.
-    nose_axial : float, [m]
-        Forward shift of the shaft's front face.
-    nose_radial, nose_tilt : (up, across), [m], [rad]
-        Of that face, and of the axis between the bearing sets; as in
+    nose_axial : float or None, [m]
+        Forward shift of the shaft's front face; None without a flange.
+    nose_radial, nose_tilt : (up, across) or None, [m], [rad]
+        Of that face, and of the axis between two bearing sets; as in
         :class:`~spindle_fem.model.elastic.machine_growth.Growth`.
     """
 
     displacement: Array
     seats: Mapping[tuple[str, Side], float]
     raceways: Mapping[tuple[str, Side], float]
-    nose_axial: float
-    nose_radial: tuple[float, float]
-    nose_tilt: tuple[float, float]
+    nose_axial: float | None
+    nose_radial: tuple[float, float] | None
+    nose_tilt: tuple[float, float] | None
 
 
 class _Placing:
@@ -155,13 +155,18 @@ class _Placing:
                 [self.face(seat.carrier, seat.face) for seat in own if seat.is_inner is side]
                 for side in (True, False)
             )
-            middle = [np.mean([facets.shift(self.shift) for facets in each], axis=0) for each in (inner, outer)]
+            middle = [
+                np.mean([facets.shift(self.shift) for facets in each], axis=0) for each in (inner, outer)
+            ]
             places.append(np.mean([facets.centre[2] for facets in inner]))
             apart.append((middle[1] - middle[0])[:2])
         turn = (apart[1] - apart[0]) / (places[1] - places[0]) if len(places) > 1 else np.zeros(2)
         shift = apart[0] - turn * places[0]
         self.move(bodies.shaft, np.array([*shift, 0.0, -turn[1], turn[0], 0.0]))
-        held = [self.face(name, model.holding_seat(name)).shift(self.shift) for name in (bodies.shaft, bodies.housing)]
+        held = [
+            self.face(name, model.holding_seat(name)).shift(self.shift)
+            for name in (bodies.shaft, bodies.housing)
+        ]
         self.move(bodies.shaft, np.array([0.0, 0.0, (held[1] - held[0])[2], 0.0, 0.0, 0.0]))
         return turn
 
@@ -196,6 +201,8 @@ def solid_growth(
     first = min(machine.layout.shaft.segment, key=lambda segment: segment.z[0])
     front = Face((first.z[0],) * 2, (0.5 * first.inner_diameter, 0.5 * first.outer_diameter))
     x, y, z = machine.face(shaft, front).shift(shift).tolist()
+    held = machine.layout.flange_ends() is not None
+    bent = held and len(model.spec.bearing_set) > 1
 
     def key(seat: Seat) -> tuple[str, Side]:
         return seat.bearing, "shaft" if seat.is_inner else "housing"
@@ -204,7 +211,7 @@ def solid_growth(
         shift,
         {key(seat): machine.face(seat.carrier, seat.face).growth(shift) for seat in model.bodies.seats},
         {key(seat): machine.face(seat.ring, seat.raceway).growth(shift) for seat in model.bodies.seats},
-        -z,
-        (y, -x),
-        (float(turn[1]), -float(turn[0])),
+        -z if held else None,
+        (y, -x) if bent else None,
+        (float(turn[1]), -float(turn[0])) if bent else None,
     )

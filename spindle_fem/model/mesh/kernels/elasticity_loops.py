@@ -41,8 +41,10 @@ def add_elements(
             for a in range(3):
                 b, c = (a + 1) % 3, (a + 2) % 3
                 for k in range(3):
-                    l, m = (k + 1) % 3, (k + 2) % 3
-                    cofactor[a, k] = jacobian[b, l] * jacobian[c, m] - jacobian[b, m] * jacobian[c, l]
+                    second, third = (k + 1) % 3, (k + 2) % 3
+                    cofactor[a, k] = (
+                        jacobian[b, second] * jacobian[c, third] - jacobian[b, third] * jacobian[c, second]
+                    )
             determinant = 0.0
             for k in range(3):
                 determinant += jacobian[0, k] * cofactor[0, k]
