@@ -117,6 +117,17 @@ def joined_parts(joint: str) -> list[str]:
     return joint.removesuffix(":face").split("|")
 
 
+def rigid_motions(points: Array) -> Array:
+    """Displacement (n, 3, 6) of points by each shift along x, y, z [m] and each turn about them [rad]."""
+    x, y, z = points.T
+    found = np.zeros((len(points), 3, 6))
+    found[:, range(3), range(3)] = 1.0
+    found[:, 1, 3], found[:, 2, 3] = -z, y
+    found[:, 0, 4], found[:, 2, 4] = z, -x
+    found[:, 0, 5], found[:, 1, 5] = -y, x
+    return found
+
+
 @dataclass(frozen=True)
 class SolidBody:
     """A free body and its loads.
@@ -183,13 +194,8 @@ class SolidBody:
     @cached_property
     def rigid(self) -> Array:
         """Orthonormal rigid motions, (3 n, 6)."""
-        x, y, z = (self.mesh.points - self.mesh.points.mean(axis=0)).T
-        motions = np.zeros((6, len(x), 3))
-        motions[range(3), :, range(3)] = 1.0
-        motions[3, :, 1], motions[3, :, 2] = -z, y
-        motions[4, :, 0], motions[4, :, 2] = z, -x
-        motions[5, :, 0], motions[5, :, 1] = -y, x
-        return np.linalg.qr(motions.reshape(6, -1).T)[0]
+        about_middle = self.mesh.points - self.mesh.points.mean(axis=0)
+        return np.linalg.qr(rigid_motions(about_middle).reshape(-1, 6))[0]
 
     @cached_property
     def _hierarchies(self) -> list[Hierarchy]:

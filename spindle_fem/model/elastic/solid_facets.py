@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spindle_fem.errors import GeometryError
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.elastic.elastic_body import Face
-from spindle_fem.model.elastic.solid_body import joined_parts
+from spindle_fem.model.elastic.solid_body import joined_parts, rigid_motions
 from spindle_fem.model.mesh.element_integrals import triangle_table
 
 Array = NDArray[np.float64]
@@ -87,17 +87,6 @@ class Facets:
         root = np.sqrt(self.weights)
         rows = (motions * root[:, None, None]).reshape(-1, 6)
         return np.linalg.lstsq(rows, (wanted * root[:, None]).ravel(), rcond=None)[0]
-
-
-def rigid_motions(points: Array) -> Array:
-    """Displacement (n, 3, 6) of points by each shift along x, y, z [m] and each turn about them [rad]."""
-    x, y, z = points.T
-    found = np.zeros((len(points), 3, 6))
-    found[:, range(3), range(3)] = 1.0
-    found[:, 1, 3], found[:, 2, 3] = -z, y
-    found[:, 0, 4], found[:, 2, 4] = z, -x
-    found[:, 0, 5], found[:, 1, 5] = -y, x
-    return found
 
 
 def outside_of(mesh: TaggedMesh, parts: Sequence[str]) -> NDArray[np.int64]:

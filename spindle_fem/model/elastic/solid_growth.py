@@ -21,8 +21,8 @@ from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.elastic.elastic_body import Face
 from spindle_fem.model.elastic.machine_bodies import Seat, elastic_material
 from spindle_fem.model.elastic.machine_growth import GrowthModel, Side, flange_back
-from spindle_fem.model.elastic.solid_body import SolidBody, SolidMesh
-from spindle_fem.model.elastic.solid_facets import Facets, lie_on, met, on_face, outside_of, rigid_motions
+from spindle_fem.model.elastic.solid_body import SolidBody, SolidMesh, rigid_motions
+from spindle_fem.model.elastic.solid_facets import Facets, lie_on, met, on_face, outside_of
 
 Array = NDArray[np.float64]
 
