@@ -56,7 +56,12 @@ class ExportedPreload:
                 "logarithm": True,
                 "lowest": self._preload.lowest_speed,
             },
-            {"input": inputs["thrust"], "gain": PER_NEWTON, "logarithm": False, "lowest": 0.0},
+            {
+                "input": inputs["thrust"],
+                "gain": PER_NEWTON,
+                "logarithm": False,
+                "lowest": float(self._preload.mounted.friction.thrust[0]),
+            },
         )
         return [
             {
