@@ -78,8 +78,10 @@ def _guess(
     drives = same(name, tuple(inputs)) or _said_input(name, unit, inputs, present)
     if drives and drives not in taken and _agrees(unit, inputs[drives]):
         return _input(name, unit, drives, inputs, present, taken)
-    if "speed" in inputs and "speed" not in taken and unit == "rpm":
-        return _input(name, unit, "speed", inputs, present, taken, "the only speed so far")
+    only = next((item for item in ("speed", "coolant_flow") if _only_of_unit(item, unit, inputs, taken)), "")
+    if only:
+        doubt = f"the only {only.replace('_', ' ')} so far"
+        return _input(name, unit, only, inputs, present, taken, doubt)
     warm, doubt = _dimension(unit) == "[temperature]", ""
     if not unit and not drives:
         warm, doubt = _warm_without_unit(name, values)
@@ -106,6 +108,13 @@ def _guess(
     no_probe = f"no probe of the machine is named after it (probes: {', '.join(machine.probes)})"
     doubt = "; ".join(filter(None, [doubt, no_probe]))
     return GuessedChannel(Channel(column=name, role="covariate", unit=unit), "a temperature", doubt)
+
+
+def _only_of_unit(drives: str, unit: str, inputs: dict[str, str], taken: set[str]) -> bool:
+    """Whether a unit alone says that a column drives an input: of speeds rpm, of flows any volume a time."""
+    if not unit or drives not in inputs or drives in taken:
+        return False
+    return unit == "rpm" if drives == "speed" else _dimension(unit) == _dimension("l/min")
 
 
 def _said_input(name: str, unit: str, inputs: dict[str, str], present: np.ndarray) -> str:

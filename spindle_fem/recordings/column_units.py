@@ -57,7 +57,12 @@ _NO_WORDS = frozenset(
 )
 _NO_WORDS_AS_WRITTEN = frozenset({"kN", "kW", "Nm", "mm", "mbar", "bar", "Hz", "kHz", "m/s", "mm/s", "mA"})
 _CELSIUS = re.compile(r"^(?P<name>(?:[Tt]|[Tt]emp\w*)[_ ].*\w)_(?P<unit>C)$")
-_UNDERSCORE = re.compile(r"^(?P<name>.*\w)_(?P<unit>degC|degF|rpm|K|s|ms|W|kW|N|kN|bar|l_min|um|mm|percent)$")
+# The longest unit that ends a name: its first underscore that leaves one.
+_UNDERSCORE = re.compile(
+    r"^(?P<name>.*?\w)_(?P<unit>degC|degF|rpm|rad_s|K|s|ms|W|kW|N|kN|bar|l_min|l_h|m3_h|lpm|gpm|um|mm|percent)$"
+)
+# "Lager vorne K" in kelvin, but no thermocouple of type K.
+_KELVIN = re.compile(r"^(?P<name>.*\w(?<!\b[Tt]yp)(?<!\b[Tt]ype)(?<!\bTC)) (?P<unit>K)$")
 
 
 # Date formats found where columns of dates and clocks would have a unit, German, French and English.
@@ -107,10 +112,12 @@ def without_unit(name: str) -> tuple[str, str]:
     (('Temp vorn', 'degC'), ('n', 'rpm'), ('Lager vorne', 'degC'))
     >>> without_unit("T_Ruecklauf_C"), without_unit("SP01"), without_unit("Temp min")
     (('T_Ruecklauf', 'degC'), ('SP01', ''), ('Temp min', ''))
+    >>> without_unit("spindle_speed_rad_s"), without_unit("Lager vorn K"), without_unit("TC Typ K")
+    (('spindle_speed', 'rad/s'), ('Lager vorn', 'K'), ('TC Typ K', ''))
     """
-    for form in (_BRACKETS, _SLASH, _UNDERSCORE, _CELSIUS, _GLUED):
+    for form in (_BRACKETS, _SLASH, _UNDERSCORE, _CELSIUS, _GLUED, _KELVIN):
         match = form.match(name.strip())
-        if match and match["name"] and (unit := unit_of_text(match["unit"].replace("l_min", "l/min"))):
+        if match and match["name"] and (unit := unit_of_text(match["unit"].replace("_", "/"))):
             return match["name"], unit
     words = name.split()
     for number in (2, 1):

@@ -11,14 +11,25 @@ from collections.abc import Iterable
 _TWO_LETTERS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue"})
 # Words are looked for as whole words, one after another where there are several, and longer ones within
 # compounds.
+_LIQUIDS = ("oil", "öl", "coolant", "kühlmittel", "kss")
+_VOLUME_FLOWS = tuple(f"{sign} {liquid}" for sign in ("v", "q", "vdot") for liquid in _LIQUIDS)
 WORDS = {
-    "ambient": ("ambient", "umgebung", "raum", "room", "halle", "hall", "luft", "air", "env"),
-    "coolant_inlet": ("inlet", "vorlauf", "zulauf", "supply", "eintritt", "coolant in", "oil in", "öl ein"),
-    "coolant_flow": ("flow", "durchfluss", "volumenstrom"),
+    "ambient": (
+        *("ambient", "amb", "tamb", "umgebung", "environment", "env"),
+        *("raum", "room", "halle", "hall", "werkstatt", "workshop", "luft", "air"),
+    ),
+    "coolant_inlet": (
+        *("inlet", "vorlauf", "vl", "zulauf", "supply", "eintritt"),
+        *("coolant in", "oil in", "öl ein"),
+    ),
+    "coolant_flow": ("flow", "durchfluss", "volumenstrom", *_VOLUME_FLOWS),
     "speed": ("speed", "drehzahl", "rpm", "vitesse", "n"),
     "thrust": ("thrust", "axialkraft", "axialforce", "vorspannkraft"),
 }
-OUTLET_WORDS = ("outlet", "rücklauf", "auslauf", "austritt", "return", "coolant out", "oil out", "öl aus")
+OUTLET_WORDS = (
+    *("outlet", "rücklauf", "rl", "auslauf", "austritt", "return"),
+    *("coolant out", "oil out", "öl aus"),
+)
 TEMPERATURE_WORDS = ("temp", "temperatur", "temperature", "tc", "pt100", "thermo", "therm")
 # Units that names without one usually mean, of quantities that a network is free to take in any unit.
 USUAL_UNITS = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import tomli_w
 
 from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.column_roles import GuessedChannel, guess_channel
+from spindle_fem.recordings.long_tables import column_a_channel
 from spindle_fem.recordings.manifest import RECORDING_SCHEMA, Channel, column_unit
 from spindle_fem.recordings.measurement_file import (
     TEXT_SUFFIXES,
@@ -172,6 +173,12 @@ def _piece(path: Path, zone: str | None) -> _Piece:
     table = read_measurement(path)
     decimal, doubt = decimal_sign(table.cells)
     time = find_time(table.cells, table.units, decimal, zone, str(path))
+    long = column_a_channel(table.cells, time.columns, decimal)
+    if long is not None:
+        cells, units = long
+        found = (*table.found, "a row a reading: turned to a column a channel, rows counted by their times")
+        table = replace(table, cells=cells, units=table.units | units, found=found)
+        time = find_time(cells, table.units, decimal, zone, str(path))
     lost = [_place(table, row, " ".join(time.columns), cell) for row, cell in time.wrong]
     columns: dict[str, np.ndarray] = {"time": time.values}
     units: dict[str, str] = {}

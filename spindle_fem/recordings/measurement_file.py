@@ -12,12 +12,16 @@ from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from spindle_fem.errors import RecordingError
 from spindle_fem.recordings.column_units import is_time_form, unit_of_text, without_unit
+
+if TYPE_CHECKING:
+    from nptdms import TdmsChannel
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".asc", ".dat")
 EXCEL_SUFFIXES = (".xlsx", ".xlsm")
@@ -104,9 +108,19 @@ def _read_binary(path: Path, name: str) -> pd.DataFrame:
         for channel in group.channels():
             unit = channel.properties.get("unit_string", "")
             columns[f"{channel.name} [{unit}]" if unit else channel.name] = channel[:]
-            if "time" not in columns and "wf_increment" in channel.properties:
-                columns = {"time [s]": channel.time_track(), **columns}
+            if "wf_increment" in channel.properties and not columns.keys() & {"time", "time [s]"}:
+                columns = {**_waveform_time(channel), **columns}
     return _of_most_common_length(path, columns)
+
+
+def _waveform_time(channel: TdmsChannel) -> dict[str, np.ndarray]:
+    """Times of a TDMS waveform: stamps in UTC, or seconds where it does not say when it began."""
+    stated = channel.properties
+    seconds = stated.get("wf_start_offset", 0.0) + stated["wf_increment"] * np.arange(len(channel))
+    start = np.datetime64(stated.get("wf_start_time", 0), "us")
+    if start < np.datetime64("1971-01-01"):
+        return {"time [s]": seconds}
+    return {"time": pd.DatetimeIndex(start + (seconds * 1e6).astype("timedelta64[us]")).tz_localize("UTC")}
 
 
 def _read_hdf5(path: Path) -> pd.DataFrame:

@@ -278,17 +278,16 @@ def _is_called_time(name: str) -> bool:
 def _counted(name: str, column: pd.Series, unit: str, decimal: str) -> FoundTime:
     values, wrong = numbers_of(column, decimal)
     middle = float(np.nanmedian(values))
-    if not unit:
-        for scale, what in (
-            (1.0, "seconds"),
-            (1e-3, "milliseconds"),
-            (1e-6, "microseconds"),
-            (1e-9, "nanoseconds"),
-        ):
-            if _EPOCH[0] < middle * scale < _EPOCH[1]:
-                return _as_stamps(name, values * scale, f"{what} from 1970 in UTC", wrong)
-        if _SERIAL[0] < middle < _SERIAL[1] and np.nanmax(values % 1.0) > 0.0:
-            return _as_stamps(name, (values - _UNIX_DAY) * 86400.0, "days as spreadsheets count them", wrong)
+    for scale, short, what in (
+        (1.0, "s", "seconds"),
+        (1e-3, "ms", "milliseconds"),
+        (1e-6, "us", "microseconds"),
+        (1e-9, "ns", "nanoseconds"),
+    ):
+        if unit in ("", short) and _EPOCH[0] < middle * scale < _EPOCH[1]:
+            return _as_stamps(name, values * scale, f"{what} from 1970 in UTC", wrong)
+    if not unit and _SERIAL[0] < middle < _SERIAL[1] and np.nanmax(values % 1.0) > 0.0:
+        return _as_stamps(name, (values - _UNIX_DAY) * 86400.0, "days as spreadsheets count them", wrong)
     unsure = () if unit else (f'column "{name}" states no unit: it is taken to count seconds',)
     return FoundTime((name,), values, unit or "s", (), unsure, wrong)
 

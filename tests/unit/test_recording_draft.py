@@ -369,3 +369,54 @@ def test_steps_with_jitter_hold_and_what_changes_steadily_does_not():
         for name, (values, _) in courses.items()
     }
     assert found == {name: hold for name, (_, hold) in courses.items()}
+
+
+def test_a_row_a_reading_becomes_a_column_a_channel(tmp_path):
+    rows = ["time,channel,value,unit"]
+    for stamp, warm, speed in zip(TIMES, WARM, SPEED, strict=True):
+        rows += [f"{stamp.isoformat()},SP01,{warm:.2f},degC", f"{stamp.isoformat()},n_ist,{speed},rpm"]
+    drafted = draft(tmp_path, "\n".join(rows) + "\n")
+    assert roles(drafted) == {"SP01": "SP01", "n_ist": "speed"}
+    assert np.abs(drafted.data["SP01"] - WARM).max() < 0.0051
+    assert drafted.data["n_ist"].tolist() == SPEED.tolist()
+
+
+def test_a_column_of_remarks_leaves_a_table_as_it_is(tmp_path):
+    rows = ["time_s,state,SP01"]
+    rows += [f"{10 * i},{'heating' if i < 30 else 'cooling'},{warm:.2f}" for i, warm in enumerate(WARM)]
+    assert roles(draft(tmp_path, "\n".join(rows) + "\n")) == {"SP01": "SP01"}
+
+
+@pytest.mark.parametrize(("scale", "name"), [(1.0, "epoch_s"), (1e3, "epoch_ms"), (1e6, "time_us")])
+def test_counts_from_1970_are_stamps_whatever_they_count(tmp_path, scale, name):
+    rows = [f"{name},SP01"]
+    rows += [f"{stamp.timestamp() * scale:.0f},{warm:.2f}" for stamp, warm in zip(TIMES, WARM, strict=True)]
+    drafted = draft(tmp_path, "\n".join(rows) + "\n")
+    assert drafted.data["time"].iloc[0] == TIMES[0]
+
+
+@pytest.mark.parametrize(
+    ("column", "unit", "means"),
+    [
+        ("T_amb", "", "ambient"),
+        ("V_oil", "", "coolant_flow"),
+        ("T_VL", "degC", "coolant_inlet"),
+        ("cooling", "l/min", "coolant_flow"),
+    ],
+)
+def test_short_names_of_inputs(column, unit, means):
+    machine = RecordableNames(
+        probes=("SP01",), inputs={"ambient": "K", "coolant_inlet": "K", "coolant_flow": "m**3/s"}
+    )
+    assert guess_channel(column, unit, 20.0 + 0.01 * np.arange(60), machine, set()).channel.drives == means
+
+
+def test_waveforms_have_the_stamps_of_their_start(tmp_path):
+    from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+
+    start = {"wf_start_time": np.datetime64("2016-05-02T10:41:30"), "wf_increment": 10.0}
+    with TdmsWriter(tmp_path / "log.tdms") as writer:
+        channel = ChannelObject("Log", "SP01", WARM, properties={**start, "unit_string": "degC"})
+        writer.write_segment([RootObject(), GroupObject("Log"), channel])
+    drafted = draft_recording([tmp_path / "log.tdms"], MACHINE)
+    assert drafted.data["time"].iloc[1] == pd.Timestamp("2016-05-02 10:41:40")
