@@ -161,7 +161,7 @@ def _legend(figure: Figure, handles: list[object], texts: list[str]) -> None:
 def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
     """Temperature along the machine: shaft surface, housing bore and outside, raceways, balls or rollers."""
     figure = new_figure(740.0)
-    axes = pixel_axes(figure, 96.0, 150.0, 1480.0, 500.0)
+    axes = pixel_axes(figure, 112.0, 150.0, 1464.0, 500.0)
     mesh = result.mesh
     shaft = largest_part(mesh.cad_volume, mesh.rotating, turning=True)
     housing = largest_part(mesh.cad_volume, mesh.rotating, turning=False)
@@ -226,9 +226,9 @@ def axial_profiles(result: ThermalResult, section: MeridianSection) -> Figure:
         texts,
         ncols=len(texts),
         loc="upper left",
-        bbox_to_anchor=(0.012, 0.89),
-        columnspacing=1.2,
-        handlelength=2.2,
+        bbox_to_anchor=(0.006, 0.89),
+        columnspacing=1.0,
+        handlelength=1.7,
     )
     races = "; raceways and rolling elements as means of each bearing" if result.bearings else ""
     set_title(figure, "Axial profiles", f"Surfaces at θ = 180°{races}.")
