@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from spindle_fem.definition.circuit_tables import CircuitFilm, WettedFilm
 from spindle_fem.definition.lubrication_tables import LubricationFilm
 from spindle_fem.definition.stream_films import StreamFilm
-from spindle_fem.operation.bearing_lubricants import bearing_stream
+from spindle_fem.operation.bearing_lubricants import bearing_stream, lubrication_oil
 from spindle_fem.physics.coolant.duct_films import DUCT_FILMS
 from spindle_fem.physics.coolant.duct_kinds import DUCT_KINDS
 from spindle_fem.physics.coolant.ducts import DuctFlow, DuctShape
 from spindle_fem.physics.coolant.falling_film import falling_film
 from spindle_fem.physics.coolant.linear_march import march_maps
 from spindle_fem.physics.coolant.lubrication_kinds import LUBRICATION_KINDS
-from spindle_fem.physics.coolant.properties import coolant_by_name
+from spindle_fem.physics.coolant.properties import Coolant, coolant_by_name
 from spindle_fem.physics.coolant.pump import PUMP_PRESSURE, Pump
 from spindle_fem.physics.coolant.streams import StreamAnswer
 from spindle_fem.validity import CodedWarning
@@ -33,13 +33,19 @@ Array = NDArray[np.float64]
 AIR_PRESSURE_DROP = 1.0e4
 
 
+def stream_fluid(film: StreamFilm) -> Coolant:
+    """Liquid or air of a stream; of oil-air its oil."""
+    if isinstance(film, LubricationFilm):
+        return lubrication_oil(film.lubrication)
+    return coolant_by_name(film.fluid)
+
+
 def stream_answer(film: StreamFilm, speed: float) -> StreamAnswer:
     """Flow and film of a stream at a speed of the shaft [rad/s]."""
     if isinstance(film, LubricationFilm):
         return LUBRICATION_KINDS[film.lubrication.kind].film(bearing_stream(film, speed))
     if isinstance(film, WettedFilm):
-        liquid = coolant_by_name(film.fluid)
-        return falling_film(liquid, film.flow, film.inlet_temperature, film.width, film.length)
+        return falling_film(stream_fluid(film), film.flow, film.inlet_temperature, film.width, film.length)
     flow = duct_flow(film, speed)
     answer = DUCT_FILMS[film.law](flow)
     conductivity = float(flow.properties.thermal_conductivity)
@@ -105,7 +111,7 @@ def duct_flow(film: CircuitFilm, speed: float = 0.0) -> DuctFlow:
         turns=film.turns,
         bore_diameter=film.bore_diameter,
     )
-    coolant = coolant_by_name(film.fluid)
+    coolant = stream_fluid(film)
     section = DUCT_KINDS[film.duct](shape)
     asked = DuctFlow(section, film.length, coolant, film.flow, film.inlet_temperature, speed)
     curve = film.pump_curve

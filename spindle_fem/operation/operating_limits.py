@@ -6,8 +6,11 @@ import math
 from collections.abc import Iterable, Iterator
 
 from spindle_fem.definition.bearing_types import RollerBearingType
+from spindle_fem.definition.lubrication_tables import LubricationFilm
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.operation.circuits import stream_fluid
 from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
 from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.coolant.properties import coolant_by_name
@@ -92,13 +95,25 @@ def _faults(spec: MachineSpec) -> Iterator[SpecError]:
         require_possible_speeds(spec, [spec.operation.speed] if spec.operation else (), "operation.speed")
     except SpecError as fault:
         yield fault
+    inlets = {}
     if spec.coolant is not None:
-        coolant, inlet = coolant_by_name(spec.coolant.fluid), spec.coolant.inlet_temperature
-        low, high = coolant.lowest_temperature, coolant.highest_temperature
+        inlets["coolant"] = coolant_by_name(spec.coolant.fluid), spec.coolant.inlet_temperature
+    for film in spec.circuits:
+        inlets[_table_of(spec, film)] = stream_fluid(film), film.inlet_temperature
+    for table, (fluid, inlet) in inlets.items():
+        low, high = fluid.lowest_temperature, fluid.highest_temperature
         if not low <= inlet <= high:
             yield SpecError(
-                "coolant.inlet_temperature",
+                f"{table}.inlet_temperature",
                 f"{inlet - ZERO_CELSIUS_K:.4g} °C.",
-                f"Properties of {coolant.name} are known from {low - ZERO_CELSIUS_K:.4g} to "
+                f"Properties of {fluid.name} are known from {low - ZERO_CELSIUS_K:.4g} to "
                 f"{high - ZERO_CELSIUS_K:.4g} °C.",
             )
+
+
+def _table_of(spec: MachineSpec, film: StreamFilm) -> str:
+    """Where a file writes a stream: streams through the bearings of one set are written once."""
+    if not isinstance(film, LubricationFilm):
+        return f"film.{film.name}"
+    group = next(group for group, bearing in spec.bearings if bearing.name == film.bearing)
+    return f"bearing_set.{group.name}.lubrication"

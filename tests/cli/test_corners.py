@@ -152,6 +152,13 @@ def test_a_checked_machine_tells_where_it_runs_and_what_was_drawn(command, tmp_p
         assert text in done.stdout
 
 
+def test_an_oil_beyond_its_known_properties_is_refused(command):
+    key = "bearing_set.front.lubrication.inlet_temperature"
+    done = command("check", "grinding_spindle", "--set", f"{key}=-30degC")
+    assert done.returncode == 2
+    assert f"{key}: -30 °C. Properties of iso_vg_10 are known from 0 to 80 °C." in done.stderr
+
+
 @pytest.mark.parametrize(
     ("override", "told"),
     [
