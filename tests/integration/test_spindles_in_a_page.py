@@ -5,9 +5,11 @@ from __future__ import annotations
 import pytest
 
 import spindle_fem
+from spindle_fem.commands.crosscheck_command import crosscheck_machine
 from spindle_fem.definition.load import find_machine
 from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.results.output_folder import is_complete
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
 
 # What tells them apart: the warmest bearing, K above the room (no measurement stands behind these bands).
@@ -52,3 +54,13 @@ def test_elements_and_network_agree(solved):
     for name, item in result.bearings.items():
         assert network[name].outer == pytest.approx(item.temperature_outer, abs=band)
         assert network[name].inner == pytest.approx(item.temperature_inner, abs=band)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PAGES)
+def test_its_cross_check_tells_what_parts_network_and_elements(name, tmp_path):
+    """Down to raceways as narrow as their contacts: cells so thin that rounding is most of the imbalance."""
+    overrides = ("mesh.preset=coarse", "mesh.order=1")
+    content = crosscheck_machine(find_machine(name), tmp_path / "out", overrides)
+    assert content["nodes"]
+    assert is_complete(tmp_path / "out")

@@ -19,6 +19,7 @@ FLOORS = (
     "validity",
     "registry",
     "correlation",
+    "bracketed_root",
     "cache",
     "parallel",
     "machine.geometry.part_shapes",

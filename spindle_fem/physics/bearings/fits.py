@@ -15,8 +15,8 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
+from spindle_fem.bracketed_root import bracketed_root
 from spindle_fem.definition.bearing_seats import LARGEST_FIT
 from spindle_fem.errors import GeometryError, SpecError
 from spindle_fem.physics.bearings.bearing_geometry import STEEL_DENSITY, BearingGeometry
@@ -337,13 +337,11 @@ def mounted_state(geometry: BearingGeometry, fits: RingFits, axial_force: float)
     """
     _require_force(axial_force)
     law = seated_rings(geometry, fits).law(FitTemperatures())
-    angle = float(
-        brentq(
-            lambda angle: _excess(geometry, axial_force, angle) - law.growth(axial_force / math.tan(angle)),
-            *_ANGLES,
-            xtol=1e-15,
-            rtol=1e-14,
-        )
+    angle = bracketed_root(
+        lambda angle: _excess(geometry, axial_force, angle) - law.growth(axial_force / math.tan(angle)),
+        *_ANGLES,
+        absolute=1e-15,
+        relative=1e-14,
     )
     return _mounted(geometry, axial_force, angle)
 
@@ -371,13 +369,11 @@ def mounted_states(
     growth = np.zeros(len(geometries))
     for _ in range(_MOST_ROUNDS):
         angles = [
-            float(
-                brentq(
-                    lambda angle, g=geometry, f=force, up=grown: _excess(g, f, angle) - up,
-                    *_ANGLES,
-                    xtol=1e-15,
-                    rtol=1e-14,
-                )
+            bracketed_root(
+                lambda angle, g=geometry, f=force, up=grown: _excess(g, f, angle) - up,
+                *_ANGLES,
+                absolute=1e-15,
+                relative=1e-14,
             )
             for geometry, force, grown in zip(geometries, axial_forces, growth.tolist(), strict=True)
         ]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import brentq
 
+from spindle_fem.bracketed_root import bracketed_root
 from spindle_fem.errors import NoEquilibriumError, SpecError
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.hertz import contact_polynomials
@@ -87,8 +87,8 @@ def axial_state(geometry: BearingGeometry, force: float) -> AxialState:
         )  # fmt: skip
     approach = 0.0
     if force > 0.0:
-        approach = float(
-            brentq(lambda x: axial_force(geometry, x) - force, 0.0, highest, xtol=1e-18, rtol=1e-14)
+        approach = bracketed_root(
+            lambda x: axial_force(geometry, x) - force, 0.0, highest, absolute=1e-18, relative=1e-14
         )
     total, angle, load = _axial(geometry, approach)
     step = 1e-6 * max(approach, 1e-7)
@@ -136,8 +136,10 @@ def tandem_approach(geometries: tuple[BearingGeometry, ...], force: float) -> fl
     if len(set(geometries)) == 1:
         return axial_state(geometries[0], force / len(geometries)).approach
     highest = max(axial_state(geometry, force).approach for geometry in geometries)
-    return float(
-        brentq(
-            lambda x: sum(axial_force(g, x) for g in geometries) - force, 0.0, highest, xtol=1e-18, rtol=1e-14
-        )
+    return bracketed_root(
+        lambda x: sum(axial_force(g, x) for g in geometries) - force,
+        0.0,
+        highest,
+        absolute=1e-18,
+        relative=1e-14,
     )

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.optimize.elementwise import find_root
 
+from spindle_fem.bracketed_root import bracketed_root
 from spindle_fem.errors import GeometryError
 from spindle_fem.physics.bearings.bearing_geometry import (
     STEEL_DENSITY,
@@ -244,6 +243,8 @@ def inner_loads(geometry: RollerGeometry, approach: FloatArray, centrifugal: flo
     if touching.any():
         wanted = approach[touching]
         most = load_of_approach(wanted, length, compliance)
+        from scipy.optimize.elementwise import find_root  # slow to load
+
         loads[touching] = find_root(excess, (np.zeros_like(wanted), most), args=(wanted,)).x
     return loads
 
@@ -286,7 +287,9 @@ def solve_roller_bearing(geometry: RollerGeometry, radial_load: float, speed: fl
     )
     found = 0.0
     if radial_load > 0.0:
-        found = float(brentq(lambda value: carried(value) - radial_load, 0.0, most, xtol=1e-15, rtol=1e-12))
+        found = bracketed_root(
+            lambda value: carried(value) - radial_load, 0.0, most, absolute=1e-15, relative=1e-12
+        )
     inner = inner_loads(geometry, approach(found), centrifugal)
     load = np.stack([inner, inner + centrifugal], axis=1)
     radius = geometry.contact_radius

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
+from spindle_fem.bracketed_root import bracketed_root
 from spindle_fem.errors import NoEquilibriumError, SpecError
 from spindle_fem.physics.bearings.ball_system import BallSystem, build_ball_rows, join_rows
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
@@ -313,4 +313,4 @@ def _balanced_shift(problem: SetProblem, thrust: float, where: str) -> float:
             raise NoEquilibriumError(
                 where, f"thrust {thrust:g} N is more than the set can carry.", "Lower the thrust."
             )
-    return float(brentq(excess, -reach, reach, xtol=1e-15, rtol=1e-13))
+    return bracketed_root(excess, -reach, reach, absolute=1e-15, relative=1e-13)

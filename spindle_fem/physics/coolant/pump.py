@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
+from spindle_fem.bracketed_root import bracketed_root
 from spindle_fem.errors import OutOfValidityError
 from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
@@ -96,4 +96,5 @@ class Pump:
 
         if not self.is_limited or lacking(1.0) <= 0.0:
             return self.flow
-        return self.flow * float(brentq(lacking, _TRICKLE, 1.0, xtol=_TOLERANCE, rtol=_TOLERANCE))
+        share = bracketed_root(lacking, _TRICKLE, 1.0, absolute=_TOLERANCE, relative=_TOLERANCE)
+        return self.flow * share
