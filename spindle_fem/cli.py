@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -25,6 +26,9 @@ from spindle_fem.command_line.application import (
 INTERRUPTED = 130
 # Modules whose commands are part of the application once they are imported.
 FAMILIES = (diagnosis_commands, recording_commands)
+# Objects made until garbage is looked for: a command makes many that last, and is over soon. A chart makes
+# some 20,000.
+COLLECT_AFTER = 50_000
 
 
 @app.command()
@@ -329,6 +333,7 @@ def main() -> None:
     """Entry point: exit status 0 done, 2 bad input, 130 interrupted, 1 anything else."""
     from spindle_fem.errors import SpindleFemError, of_system
 
+    gc.set_threshold(COLLECT_AFTER)
     # The solver is bound by memory: more threads only wait for one another, spinning.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

@@ -253,6 +253,28 @@ class BearingMechanics:
             found |= {state.name: state for state in states}
         return found
 
+    def states_over_thrust(
+        self,
+        group: BearingSet,
+        point: OperatingPoint,
+        thrusts: Sequence[float],
+        temperatures: Mapping[str, BearingTemperatures],
+    ) -> tuple[tuple[BearingState, ...], ...]:
+        """States of one set at several thrusts (N), without the preload that would remain.
+
+        Parts keep the size of assembly.
+        """
+        around = [[temperatures[bearing.name] for bearing in group.bearing]] * len(thrusts)
+        points = [replace(point, thrust=float(thrust)) for thrust in thrusts]
+        if isinstance(self.sets[group.name], RollerSet):
+            return tuple(self._roller_states(group, own, around[:1], False)[0] for own in points)
+        mounted, kelvins = self._mounted(group, around, False)
+        lubricant, loads = self.lubricants[group.name], [self._load(group, own) for own in points]
+        return solve_states(
+            mounted, point.speed, loads, kelvins, lubricant=lubricant.at(point.speed),
+            control=_control(self.options), heat=lubricant.options(self.options),
+        )  # fmt: skip
+
     def knows(self, temperature: float) -> bool:
         """Whether the viscosity of every lubricant is known at a temperature (K)."""
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import pickle
 import queue
@@ -134,6 +135,8 @@ def _serve(make: Callable[[], Any], connection: Any, other_end: Any) -> None:
     from threadpoolctl import threadpool_limits
 
     other_end.close()
+    # what the original holds is no garbage of this process, and looking at it would copy it
+    gc.freeze()
     os.environ.update(ONE_THREAD)
     # xarray would load Dask, for half a second, to ask whether arrays are Dask's: here none is
     sys.modules.setdefault("dask", None)

@@ -15,7 +15,8 @@ from spindle_fem.model.elastic.ring_seats import RingSeats
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures, grows
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.bearings.bearing_state import BearingState
-from spindle_fem.physics.bearings.heat_model import friction_model_names
+from spindle_fem.physics.bearings.heat_model import HeatOptions, friction_model_names
+from spindle_fem.physics.bearings.heat_models import HEAT_MODELS
 from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.bearings.roller_set import RollerSet
 from spindle_fem.physics.bearings.seat_contact import SeatBodies
@@ -80,6 +81,7 @@ def heat_study(
         seats = RingSeats(spec, machine_bodies(spec)).of_sets(spec)
     mechanics = BearingMechanics(spec, seats)
     factors = {bearing.name: group.heat_factor.value for group, bearing in spec.bearings}
+    own = _with_alike(mechanics, mechanics.options.level)
     names = [bearing.name for _, bearing in spec.bearings]
     uniform = {name: BearingTemperatures(*(temperature,) * 5) for name in names}
     by_speed = _solved_temperatures(spec, chosen) if coupled else {}
@@ -90,7 +92,7 @@ def heat_study(
         at_speed = replace(point, speed=speed)
         here = by_speed.get(speed, temperatures or uniform)
         try:
-            states = mechanics.states(at_speed, here, expand=expand)
+            states = mechanics.states(at_speed, here, expand=expand, options=own)
             isothermal = mechanics.states(at_speed, uniform, expand=False)
         except NoEquilibriumError as error:
             warnings.append(CodedWarning("no_equilibrium", f"{speed / RPM:.0f} rpm: {error}"))
@@ -99,7 +101,7 @@ def heat_study(
             state = _scaled(states[name], factors[name])
             rows[name].append(_row(state, speed, here[name], isothermal[name]))
             warnings += state.warnings
-        models.append(_by_model(mechanics, at_speed, here, expand))
+        models.append(_by_model(mechanics, at_speed, here, states, expand))
     return {
         "schema": HEAT_SCHEMA,
         "machine": spec.name,
@@ -200,21 +202,48 @@ def _row(
     }
 
 
+def _levels(mechanics: BearingMechanics) -> tuple[str, ...]:
+    """Heat models that know every bearing of a machine."""
+    rollers = any(isinstance(mounted, RollerSet) for mounted in mechanics.sets.values())
+    return friction_model_names(rollers=rollers)
+
+
+def _with_alike(mechanics: BearingMechanics, level: str) -> HeatOptions:
+    """Options of a heat model, beside it those of which the balls turn as with it."""
+    attitude = HEAT_MODELS[level].ball_attitude
+    alike = [name for name in _levels(mechanics) if HEAT_MODELS[name].ball_attitude == attitude]
+    return replace(mechanics.options, level=level, beside=tuple(name for name in alike if name != level))
+
+
 def _by_model(
     mechanics: BearingMechanics,
     point: OperatingPoint,
     temperatures: Mapping[str, BearingTemperatures],
+    states: Mapping[str, BearingState],
     expand: bool,
 ) -> dict[str, Any]:
-    """Heat of every bearing by every model, side by side, with the factor of the machine on it."""
+    """Heat of every bearing by every model, side by side, with the factor of the machine on it.
+
+    ``states`` are those with the options of :func:`_with_alike`.
+    """
     factors = {bearing.name: group.heat_factor.value for group, bearing in mechanics.spec.bearings}
-    heat: dict[str, dict[str, float]] = {}
-    rollers = any(isinstance(mounted, RollerSet) for mounted in mechanics.sets.values())
-    for level in friction_model_names(rollers=rollers):
-        options = replace(mechanics.options, level=level)
-        states = mechanics.states(point, temperatures, expand=expand, options=options)
-        heat[level] = {name: factors[name] * state.heat.total for name, state in states.items()}
-    return {"speed_rpm": point.speed / RPM, "heat_W": heat}
+    found = _heats(states, factors)
+    levels = _levels(mechanics)
+    for level in levels:
+        if level not in found:
+            options = _with_alike(mechanics, level)
+            others = mechanics.states(point, temperatures, expand=expand, options=options)
+            found |= _heats(others, factors)
+    return {"speed_rpm": point.speed / RPM, "heat_W": {level: found[level] for level in levels}}
+
+
+def _heats(states: Mapping[str, BearingState], factors: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """Heat of states by model and bearing, W."""
+    found: dict[str, dict[str, float]] = {}
+    for name, state in states.items():
+        for level, heat in {state.heat.model: state.heat.total, **state.heat_beside}.items():
+            found.setdefault(level, {})[name] = factors[name] * heat
+    return found
 
 
 def _thrust_sweep(
@@ -224,21 +253,17 @@ def _thrust_sweep(
     temperatures: dict[str, BearingTemperatures],
 ) -> list[dict[str, Any]]:
     """Axial load and displacement of the set that carries the thrust, up to twice the operating thrust."""
-    rows = []
-    carrying = {bearing.name for group, bearing in spec.bearings if group.carries_thrust}
-    for thrust in np.linspace(0.0, 2.0 * point.thrust, THRUST_STEPS):
-        states = mechanics.states(replace(point, thrust=float(thrust)), temperatures, expand=False)
-        rows.append(
-            {
-                "thrust_N": float(thrust),
-                "bearings": {
-                    name: {
-                        "axial_load_N": states[name].axial_force,
-                        "axial_displacement_um": 1e6 * states[name].axial_displacement,
+    thrusts = np.linspace(0.0, 2.0 * point.thrust, THRUST_STEPS).tolist()
+    rows = [{"thrust_N": thrust, "bearings": {}} for thrust in thrusts]
+    for group in spec.bearing_set:
+        if group.carries_thrust:
+            found = mechanics.states_over_thrust(group, point, thrusts, temperatures)
+            for row, states in zip(rows, found, strict=True):
+                row["bearings"] |= {
+                    state.name: {
+                        "axial_load_N": state.axial_force,
+                        "axial_displacement_um": 1e6 * state.axial_displacement,
                     }
-                    for name in states
-                    if name in carrying
-                },
-            }
-        )
+                    for state in states
+                }
     return rows

@@ -379,3 +379,15 @@ def test_contact_resistance_without_contact_is_infinite() -> None:
         state, balls=replace(state.balls, semi_major=np.zeros((1, 2)), semi_minor=np.zeros((1, 2)))
     )
     assert contact_resistance(empty) == (math.inf, math.inf)
+
+
+@pytest.mark.parametrize("rpm", [0.0, 3000.0])
+def test_other_heat_models_of_the_same_equilibrium_come_beside(rpm: float) -> None:
+    def states(heat: HeatOptions):
+        return solve_bearing_set(TBT, turn(rpm), 1750.0, WARM, lubricant=GREASE, control="outer", heat=heat)
+
+    both, alone = states(HeatOptions("palmgren", beside=("skf",))), states(HeatOptions("skf"))
+    assert [state.heat.model for state in both] == ["palmgren"] * 3
+    beside = [state.heat_beside["skf"] for state in both]
+    assert beside == pytest.approx([state.heat.total for state in alone], rel=1e-12)
+    assert (beside[0] > 0.0) == (rpm > 0.0)

@@ -219,3 +219,14 @@ class TestFilmMap:
     def test_exactly_one_of_velocity_and_flow(self, given):
         with pytest.raises(OutOfValidityError, match="Give exactly one of them"):
             film_map("paper", CHANNEL, OIL, self.DEPTHS, self.TEMPERATURES, **given)
+
+
+@pytest.mark.parametrize("model", FILM_MODELS)
+@pytest.mark.parametrize("litres", [20.0, 400.0, 1500.0])
+def test_the_value_alone_is_that_of_the_band(model, litres):
+    state = ChannelState(OIL, litres * LITRE_PER_MINUTE, np.array([285.0, 304.0]), np.array([290.0, 300.0]))
+    whole, alone = (select_film(model, CHANNEL, state, bounds=bounds) for bounds in (True, False))
+    for name in ("value", "regime", "in_range", "warnings", "source"):
+        assert np.array_equal(getattr(whole, name), getattr(alone, name))
+    assert np.array_equal(alone.low, alone.value)
+    assert np.array_equal(alone.high, alone.value)

@@ -23,6 +23,7 @@ from spindle_fem.model.mesh.equations import assemble_capacity, assemble_system
 from spindle_fem.model.mesh.heat_balance import require_balance
 from spindle_fem.model.mesh.linear_solvers import build_preconditioner, solve_linear
 from spindle_fem.model.mesh.mesh_operators import build_operators
+from spindle_fem.model.mesh.renewed_equations import Equations, RenewedEquations
 from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.model.mesh.temperature_films import film_heat_flux, linearise_films
 
@@ -306,3 +307,34 @@ def test_an_exact_guess_is_the_answer(quadratic_system):
     nothing = np.zeros(matrix.shape[0])
     found = solve_linear(matrix, nothing, preconditioner, nothing, error_tolerance=1e-9)
     assert not found.unknowns.any()
+
+
+def test_equations_are_renewed_as_they_are_made_anew():
+    operators = build_operators(build_joined_tubes((0.1, 0.15, 0.2), 0.1, ((1, 1), 12, 2)), 2)
+
+    def problem(share: float, conductivity: float = 40.0, joint: float = 1000.0) -> ConductionProblem:
+        count = operators.surface_rows["outer.outer"]
+        film = share * np.linspace(30.0, 60.0, count.stop - count.start)
+        return ConductionProblem(
+            operators,
+            {"inner": conductivity, "outer": 20.0},
+            films=(Film("outer.outer", film, 293.15 + share),),
+            joint_conductance={"inner|outer": share * joint},
+            surface_heat={"inner.inner": 100.0 * share},
+            lumped_nodes=(LumpedNode("air", (("inner.z1", 50.0 * share), ("outer.z1", 30.0)), heat=3.0),),
+            adiabatic="rest",
+        )
+
+    kept = RenewedEquations()
+    problems = (*(problem(share) for share in (1.0, 0.9, 1.2, 1.2)), problem(1.0, 45.0))
+    for given in (*problems, problem(1.0, joint=np.inf), problem(1.0)):
+        own, anew = kept.of(given), Equations.of(given)
+        for name in ("data", "indices", "indptr"):
+            np.testing.assert_array_equal(getattr(own.matrix, name), getattr(anew.matrix, name))
+        np.testing.assert_array_equal(own.system.matrix.data, anew.system.matrix.data)
+        np.testing.assert_array_equal(own.system.exchange.toarray(), anew.system.exchange.toarray())
+        # loads count from another temperature: what is solved is the same
+        shift = own.system.reference_temperature - anew.system.reference_temperature
+        np.testing.assert_allclose(
+            own.tied.full_load(), anew.tied.full_load() - shift * anew.matrix.sum(axis=1), rtol=0.0, atol=1e-9
+        )

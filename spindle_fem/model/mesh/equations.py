@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -33,6 +36,50 @@ def assemble_system(problem: ConductionProblem, reference: float | None = None) 
         raise SpecError("problem", "film laws must be linearised before assembly.", "Use linearise_films.")
     operators = problem.operators
     upper = operators.sum_conduction(conductivity_of_parts(problem))
+    exchange = facet_exchange(problem)
+    for joint, conductance in exchange.joints.items():
+        operators.add_joint(upper, joint, conductance)
+    operators.add_films(upper, exchange.coefficient)
+    if reference is None:
+        reference = reference_temperature(problem)
+    load, lumped_load = assemble_load(problem, reference)
+    return ThermalSystem(
+        operators.matrix(upper),
+        load,
+        exchange.columns,
+        exchange.lumped_matrix,
+        lumped_load,
+        reference,
+        _tie_matrix(operators, exchange.ties),
+        operators.prolongation,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class FacetExchange:
+    """What films, joints and lumped nodes of a problem exchange over facets.
+
+    Attributes
+    ----------
+    coefficient : (n_facets,) ndarray, [W/(m²·K)]
+        Of all that a facet gives heat to.
+    joints : mapping of str to (n,) ndarray, [W/(m²·K)]
+        Of each pair of facets; perfect ones are in ``ties``.
+    columns : (n, m) csc_array, [W/K]
+        Between unknowns and lumped nodes.
+    lumped_matrix : (m, m) ndarray, [W/K]
+    """
+
+    coefficient: NDArray[np.float64]
+    joints: Mapping[str, NDArray[np.float64]]
+    ties: tuple[str, ...]
+    columns: sparse.csc_array
+    lumped_matrix: NDArray[np.float64]
+
+
+def facet_exchange(problem: ConductionProblem) -> FacetExchange:
+    """Exchange of a problem without film laws."""
+    operators = problem.operators
     coefficient = np.zeros(len(operators.facet_area))
     for film in problem.films:
         coefficient[operators.surface_rows[film.surface]] += np.asarray(film.coefficient)
@@ -48,7 +95,7 @@ def assemble_system(problem: ConductionProblem, reference: float | None = None) 
             total += float(values @ operators.facet_area[rows])
         columns.append(column)
         diagonal.append(total)
-    ties = []
+    ties, joints = [], {}
     for joint, value in problem.joint_conductance.items():
         side_a, side_b = operators.joint_rows[joint]
         if np.ndim(value) == 0 and np.isinf(value):
@@ -57,20 +104,13 @@ def assemble_system(problem: ConductionProblem, reference: float | None = None) 
         conductance = spread(value, side_a.stop - side_a.start, joint)
         coefficient[side_a] += conductance
         coefficient[side_b] += conductance
-        operators.add_joint(upper, joint, conductance)
-    operators.add_films(upper, coefficient)
-    if reference is None:
-        reference = reference_temperature(problem)
-    load, lumped_load = assemble_load(problem, reference)
-    return ThermalSystem(
-        operators.matrix(upper),
-        load,
+        joints[joint] = conductance
+    return FacetExchange(
+        coefficient,
+        joints,
+        tuple(ties),
         _as_columns(columns, operators.n_unknowns),
         _lumped_matrix(problem, diagonal),
-        lumped_load,
-        reference,
-        _tie_matrix(operators, ties),
-        operators.prolongation,
     )
 
 
@@ -148,7 +188,7 @@ def _lumped_matrix(problem: ConductionProblem, diagonal: list[float]) -> NDArray
     return matrix
 
 
-def _tie_matrix(operators: ThermalOperators, joints: list[str]) -> sparse.csr_array | None:
+def _tie_matrix(operators: ThermalOperators, joints: Sequence[str]) -> sparse.csr_array | None:
     if not joints:
         return None
     sides = [operators.joint_rows[joint] for joint in joints]

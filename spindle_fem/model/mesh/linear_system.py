@@ -97,11 +97,7 @@ def _bordered(
     corner : (m, m) ndarray
     """
     n, m = border.shape
-    # every entry of the corner, so that its pattern is the same whatever is zero
-    square = sparse.csr_array(
-        (np.ravel(corner), np.tile(np.arange(m), m), np.arange(0, m * m + 1, m)), shape=(m, m)
-    )
-    below = sparse.csr_array(sparse.hstack((border.T, square)))
+    below = rows_below(border, corner)
     ends = matrix.indptr + border.indptr
     indptr = np.concatenate((ends, ends[-1] + below.indptr[1:])).astype(np.int32)
     indices, data = room(int(indptr[-1]), np.int32), room(int(indptr[-1]))
@@ -109,6 +105,16 @@ def _bordered(
     rows = [(*unsigned(part.indptr, part.indices), part.data) for part in (matrix, border)]
     run_blocks(join_rows, row_blocks(n), *rows[0], *rows[1], 0, n, *unsigned(indptr, indices), data)
     return sparse.csr_array((data, indices, indptr), shape=(n + m, n + m))
+
+
+def rows_below(border: sparse.csr_array, corner: NDArray[np.float64]) -> sparse.csr_array:
+    """The last rows ``[Bᵀ C]`` of a bordered matrix, (m, n + m)."""
+    m = border.shape[1]
+    # every entry of the corner, so that its pattern is the same whatever is zero
+    square = sparse.csr_array(
+        (np.ravel(corner), np.tile(np.arange(m), m), np.arange(0, m * m + 1, m)), shape=(m, m)
+    )
+    return sparse.csr_array(sparse.hstack((border.T, square)))
 
 
 def merged(matrix: sparse.csr_array, tie: sparse.csr_array) -> sparse.csr_array:

@@ -14,7 +14,6 @@ from spindle_fem.model.mesh.conduction_problem import (
     reference_temperature,
     require_surroundings,
 )
-from spindle_fem.model.mesh.equations import assemble_system
 from spindle_fem.model.mesh.heat_balance import (
     BALANCE_TOLERANCE,
     LINEAR_BALANCE_TOLERANCE,
@@ -31,6 +30,7 @@ from spindle_fem.model.mesh.linear_solvers import (
     solve_linear,
 )
 from spindle_fem.model.mesh.linear_system import ThermalSystem
+from spindle_fem.model.mesh.renewed_equations import Equations, RenewedEquations
 from spindle_fem.model.mesh.temperature_films import law_heat, linearise_films
 
 NONLINEAR_TOLERANCE_K = 1e-6
@@ -89,6 +89,7 @@ def solve_steady(
     relative_tolerance: float = RELATIVE_TOLERANCE,
     nonlinear_tolerance: float = NONLINEAR_TOLERANCE_K,
     balance_tolerance: float | None = None,
+    equations: RenewedEquations | None = None,
 ) -> ConductionSolution:
     """Solve a steady problem; film laws by Newton's method.
 
@@ -107,6 +108,8 @@ def solve_steady(
     balance_tolerance : float, optional, [-]
         Largest relative difference of heat in and out; 1e-10 when linear and
         1e-8 with film laws unless given.
+    equations : RenewedEquations, optional
+        That problems without film laws on one mesh share.
 
     Raises
     ------
@@ -119,12 +122,11 @@ def solve_steady(
         return _solve_nonlinear(
             problem, guess, preconditioner, method, relative_tolerance, nonlinear_tolerance, balance_tolerance
         )
-    system = assemble_system(problem)
-    tied = system.tied()
+    own = Equations.of(problem) if equations is None else equations.of(problem)
+    system, matrix, load = own.system, own.matrix, own.tied.full_load()
     if preconditioner is None:
-        preconditioner = build_preconditioner(tied, method)
+        preconditioner = build_preconditioner(own.tied, method)
     start = None if guess is None else _start_values(system, guess)
-    matrix, load = tied.full_matrix(), tied.full_load()
     solution = solve_linear(matrix, load, preconditioner, start, relative_tolerance=relative_tolerance)
     unknowns = close_balance(matrix, load, solution.unknowns)
     rise, lumped_rise = split_unknowns(unknowns, system.n_lumped, system.tie)

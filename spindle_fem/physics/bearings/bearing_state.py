@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +114,8 @@ class BearingState:
         Heat over speed; 0 at rest.
     lubricant_temperature : float, [K]
     residual : float, [-]
+    heat_beside : mapping of str to float, [W]
+        Heat by the further models of ``HeatOptions.beside``.
     """
 
     name: str
@@ -131,6 +133,7 @@ class BearingState:
     lubricant_temperature: float
     residual: float
     warnings: tuple[CodedWarning, ...]
+    heat_beside: Mapping[str, float] = field(default_factory=dict)
 
     def mean(self, name: str, side: int | None = None) -> float:
         """Mean over the balls of a field of ``BallStates`` (one contact of it).

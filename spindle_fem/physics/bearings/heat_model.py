@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -31,6 +31,8 @@ class HeatOptions:
     ----------
     level : str
         One of :func:`friction_model_names`.
+    beside : tuple of str
+        Further ones, whose heat in the same equilibrium ``BearingState.heat_beside`` gets.
     rolling_surfaces : {2, 1}
         Houpert's rolling force acts on both surfaces of a contact: power
         2 F_R u. Some papers count one.
@@ -50,6 +52,11 @@ class HeatOptions:
     skf_replenishment: float = 6.0e-8
     skf_friction_ehl: float = 0.04
     skf_friction_boundary: float = 0.15
+    beside: tuple[str, ...] = ()
+
+    def others(self) -> tuple[HeatOptions, ...]:
+        """Options of the further models."""
+        return tuple(replace(self, level=level, beside=()) for level in self.beside)
 
     def __post_init__(self) -> None:
         known = friction_model_names()

@@ -169,7 +169,12 @@ def _lubricated(
     kelvin, speed = state.lubricant_temperature, state.speed
     warnings = [*state.warnings, *lubricant.temperature_warnings(kelvin, state.name)]
     if not speed > 0.0:
-        return replace(state, heat=BearingHeat(options.level, {}, {}), warnings=tuple(warnings))
+        return replace(
+            state,
+            heat=BearingHeat(options.level, {}, {}),
+            warnings=tuple(warnings),
+            heat_beside=dict.fromkeys(options.beside, 0.0),
+        )
     viscosity = float(lubricant.kinematic_viscosity(kelvin))
     given = RollerHeatInputs(state.geometry, solved, speed, viscosity)
     heat = roller_heat(given, options)
@@ -179,7 +184,12 @@ def _lubricated(
         text = f"{state.name}: lambda is {thinnest:.2f}; below 3 asperities touch."
         warnings.append(CodedWarning("film_not_separating", text))
     return replace(
-        state, balls=balls, heat=heat, friction_moment=heat.total / speed, warnings=tuple(warnings)
+        state,
+        balls=balls,
+        heat=heat,
+        friction_moment=heat.total / speed,
+        warnings=tuple(warnings),
+        heat_beside={other.level: roller_heat(given, other).total for other in options.others()},
     )
 
 

@@ -169,6 +169,7 @@ def build_states(
             _cut(system, part), solved.ball_speeds[part],
         )  # fmt: skip
         bearing_heat_record: BearingHeat | None = None
+        beside = dict.fromkeys(heat.beside, 0.0)
         temperature = float(lubrication.temperatures[index])
         cage = int(np.sum(weight[solved.carried[part]]))
         grooves = (distance[0][part], distance[1][part]) if solved_bearings.held else None
@@ -185,6 +186,7 @@ def build_states(
                     float(lubricant.kinematic_viscosity(temperature)), axial_force, radial_force,
                 )  # fmt: skip
                 bearing_heat_record = bearing_heat(local, heat)
+                beside = {other.level: bearing_heat(local, other).total for other in heat.others()}
                 balls, film_warnings = _with_films(bearing.name, balls, local, options, lubrication.roughness)
                 warnings += film_warnings
                 warnings += _heat_warnings(bearing.name, geometry, heat)
@@ -202,7 +204,7 @@ def build_states(
             BearingState(
                 bearing.name, geometry, speed, float(np.mean(distance[0][part])) - free, radial_shift,
                 axial_force, radial_force, math.nan, stiffness, balls, bearing_heat_record,
-                total / speed if speed else 0.0, temperature, solved.residual, tuple(warnings),
+                total / speed if speed else 0.0, temperature, solved.residual, tuple(warnings), beside,
             )
         )  # fmt: skip
     return tuple(states)

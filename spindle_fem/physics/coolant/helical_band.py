@@ -23,7 +23,7 @@ _TURBULENT_SCATTER = 1.15
 OIL_BLEND_PRANDTL = (30.0, 100.0)
 
 
-def helical_band(flow: FlowGroups) -> FilmBand:
+def helical_band(flow: FlowGroups, *, bounds: bool = True) -> FilmBand:
     """Value, low and high of a helical channel, laminar and turbulent joined without a jump.
 
     Laminar: for oil (Pr above 100) the geometric mean of the two sets of
@@ -34,15 +34,20 @@ def helical_band(flow: FlowGroups) -> FilmBand:
     Low and high: the lowest and highest of all laminar correlations whose source covers
     the state. Turbulent: Gnielinski; low is the straight duct, high the scatter of the data
     (15 %). Between the critical Reynolds number (Schmidt) and 2.2e4 linear.
+
+    Parameters
+    ----------
+    bounds : bool
+        Whether low, high and candidates are wanted; without them both are the value.
     """
     weight = transition_weight(flow.reynolds, flow.critical_reynolds)
     bands: list[tuple[Array, FilmBand]] = []
     if (weight > 0.0).any():
         laminar = np.minimum(flow.reynolds, flow.critical_reynolds)
-        bands.append((weight, _laminar_band(flow.at_reynolds(laminar))))
+        bands.append((weight, _laminar_band(flow.at_reynolds(laminar), bounds)))
     if (weight < 1.0).any():
         turbulent = np.maximum(flow.reynolds, TURBULENT_FROM_REYNOLDS)
-        bands.append((1.0 - weight, _turbulent_band(flow.at_reynolds(turbulent))))
+        bands.append((1.0 - weight, _turbulent_band(flow.at_reynolds(turbulent), bounds)))
     in_range = np.ones(weight.shape, dtype=bool)
     candidates: dict[str, Array] = {}
     faults: tuple[str, ...] = ()
@@ -67,7 +72,7 @@ def _correlations(regime: Regime) -> Iterator[tuple[str, NusseltCorrelation]]:
             yield name, model
 
 
-def _laminar_band(flow: FlowGroups) -> FilmBand:
+def _laminar_band(flow: FlowGroups, bounds: bool) -> FilmBand:
     floor = nusselt_straight_developing.at(flow)
     theory = nusselt_manlapaz_churchill.at(flow)
     measured = np.sqrt(nusselt_seban_mclaughlin.at(flow) * nusselt_janssen_hoogendoorn.at(flow))
@@ -80,7 +85,7 @@ def _laminar_band(flow: FlowGroups) -> FilmBand:
     # Prandtl number always. None goes below the straight duct, which curvature can only improve.
     candidates: dict[str, Array] = {}
     applicable = [floor, value]
-    for name, known in _correlations("laminar"):
+    for name, known in _correlations("laminar") if bounds else ():
         candidates[name] = known.at(flow)
         raised = np.maximum(candidates[name], floor)
         applicable.append(raised if known.counts else np.where(known.covers_flow(flow), raised, value))
@@ -99,25 +104,28 @@ def _laminar_band(flow: FlowGroups) -> FilmBand:
         faults = tuple(f"Seban & McLaughlin: {text}" for text in texts)
     return FilmBand(
         value=value,
-        low=np.minimum.reduce(np.broadcast_arrays(*applicable)),
-        high=np.maximum.reduce(np.broadcast_arrays(*applicable)),
+        low=np.minimum.reduce(np.broadcast_arrays(*applicable)) if bounds else value,
+        high=np.maximum.reduce(np.broadcast_arrays(*applicable)) if bounds else value,
         faults=faults,
         in_range=in_range,
         candidates=candidates,
     )
 
 
-def _turbulent_band(flow: FlowGroups) -> FilmBand:
+def _turbulent_band(flow: FlowGroups, bounds: bool) -> FilmBand:
     value = nusselt_gnielinski_helical.at(flow)
-    straight = nusselt_gnielinski_helical(
-        flow.reynolds, flow.prandtl, 0.0, flow.prandtl_ratio, extrapolate=True
-    )
-    candidates = {"gnielinski_straight": straight}
-    low, high = np.minimum(straight, value / _TURBULENT_SCATTER), value * _TURBULENT_SCATTER
-    for name, known in _correlations("turbulent"):
-        candidates[name] = known.at(flow)
-        applicable = np.where(known.covers_flow(flow), candidates[name], value)
-        low, high = np.minimum(low, applicable), np.maximum(high, applicable)
+    candidates: dict[str, Array] = {}
+    low = high = value
+    if bounds:
+        straight = nusselt_gnielinski_helical(
+            flow.reynolds, flow.prandtl, 0.0, flow.prandtl_ratio, extrapolate=True
+        )
+        candidates["gnielinski_straight"] = straight
+        low, high = np.minimum(straight, value / _TURBULENT_SCATTER), value * _TURBULENT_SCATTER
+        for name, known in _correlations("turbulent"):
+            candidates[name] = known.at(flow)
+            applicable = np.where(known.covers_flow(flow), candidates[name], value)
+            low, high = np.minimum(low, applicable), np.maximum(high, applicable)
     faults = nusselt_gnielinski_helical.faults(**flow.only(("reynolds", "prandtl", "curvature_ratio")))
     return FilmBand(
         value=value,

@@ -12,6 +12,7 @@ it are channels in parallel (starts) with the same inlet.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,8 @@ from spindle_fem.validity import NOT_NEGATIVE, POSITIVE, require_range
 
 _ITERATIONS = 50
 _TEMPERATURE_TOLERANCE_K = 1.0e-10
+# Channels of a march up to which plain numbers are quicker than arrays.
+FEW_CHANNELS = 8
 _GAUSS_POINTS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
@@ -123,9 +126,7 @@ def march_enthalpy(
     # the temperature differences, not with 300 K.
     wall_difference = wall - inlet_temperature
     gain = reached * wall_difference + mean_share * friction_rise
-    edges = np.zeros((*wall.shape[:-1], wall.shape[-1] + 1))
-    for cell in range(wall.shape[-1]):
-        edges[..., cell + 1] = gain[..., cell] + (1.0 - reached[..., cell]) * edges[..., cell]
+    edges = _one_after_the_other(gain, 1.0 - reached)
     start = edges[..., :-1]
     heat = capacity_rate * (gain - reached * start) - pumping
     bulk = start + (1.0 - mean_share) * (wall_difference - start) + second_share * friction_rise
@@ -175,7 +176,7 @@ class ChannelMarch:
     ----------
     film : FilmCoefficient
         Before ``film_factor``; values of shape (..., n), or floats when
-        nothing varies along the channel.
+        nothing varies along the channel. Low and high are those of the value unless the march is settled.
     mass_flow : float, [kg/s]
         Of each start.
     """
@@ -272,8 +273,7 @@ class DrivenChannel:
             if before is not None:
                 bulk, edges = before.march.bulk_temperature, before.march.edge_rise
                 capacity = _mean_heat_capacity(self.coolant, inlet, edges[..., :-1], edges[..., 1:])
-            state = ChannelState(self.coolant, self.volume_flow, bulk, wall if local else None)
-            film = select_film(choice.model, self.section, state)
+            film = self._film(wall, bulk, bounds=False)
         coefficient = np.asarray(choice.factor, dtype=np.float64) * np.asarray(film.value)
         area = np.asarray(self.wetted_area, dtype=np.float64)
         pumping = np.asarray(self.pumping_power) / self.section.starts
@@ -304,7 +304,8 @@ class DrivenChannel:
                 f"walls of {given} starts are given, the channel has {self.section.starts}.",
                 "Give every start, or one that stands for all.",
             )
-        found = self._settled(wall)
+        found, bulk = self._settled(wall)
+        found = replace(found, film=self._film(wall, bulk, bounds=True))
         if self.choice.properties_at == "inlet":
             return found
         return replace(found, march=_with_true_enthalpy(found.march, self.coolant, float(found.mass_flow)))
@@ -321,26 +322,32 @@ class DrivenChannel:
         OutOfValidityError, ConvergenceError
             As :meth:`settle`.
         """
-        outlet = self._settled(walls).march.outlet_temperature
+        outlet = self._settled(walls)[0].march.outlet_temperature
         mixed = outlet.mean(axis=-1)
         return mixed if self.choice.properties_at == "inlet" else _mixed(self.coolant, outlet, mixed)
 
-    def _settled(self, wall: ArrayLike) -> ChannelMarch:
-        """A march with properties at its own temperatures.
+    def _film(self, wall: ArrayLike, bulk: ArrayLike, *, bounds: bool) -> FilmCoefficient:
+        """Film at bulk temperatures; low and high too if wanted."""
+        wall = wall if self.choice.properties_at == "local" else None
+        state = ChannelState(self.coolant, self.volume_flow, bulk, wall)
+        return select_film(self.choice.model, self.section, state, bounds=bounds)
+
+    def _settled(self, wall: ArrayLike) -> tuple[ChannelMarch, ArrayLike]:
+        """A march with properties at its own temperatures, and the bulk temperatures its film is at.
 
         Raises
         ------
         ConvergenceError
         """
-        found = self.march(wall)
+        found, bulk = self.march(wall), self.inlet_temperature
         if self.choice.properties_at == "inlet":
-            return found
+            return found, bulk
         for _ in range(_ITERATIONS):
             bulk = found.march.bulk_temperature
             found = self.march(wall, found)
             change = float(np.max(np.abs(found.march.bulk_temperature - bulk)))
             if change <= _TEMPERATURE_TOLERANCE_K:
-                return found
+                return found, bulk
         raise ConvergenceError(
             "coolant march",
             f"bulk temperature still changes by {change:.3g} K after {_ITERATIONS} iterations.",
@@ -390,6 +397,19 @@ def exponential_shares(
     )
     second_share = np.where(small, series_second, (1.0 - mean_share) / divisor)
     return reached, mean_share, second_share
+
+
+def _one_after_the_other(gain: NDArray[np.float64], kept: NDArray[np.float64]) -> NDArray[np.float64]:
+    """``e[i + 1] = gain[i] + kept[i] e[i]`` from ``e[0] = 0`` along the last axis, (..., n + 1)."""
+    edges = np.zeros((*gain.shape[:-1], gain.shape[-1] + 1))
+    if gain.size > FEW_CHANNELS * gain.shape[-1]:
+        for cell in range(gain.shape[-1]):
+            edges[..., cell + 1] = gain[..., cell] + kept[..., cell] * edges[..., cell]
+        return edges
+    for channel in np.ndindex(gain.shape[:-1]):
+        at = zip(gain[channel].tolist(), kept[channel].tolist(), strict=True)
+        edges[channel] = list(accumulate(at, lambda edge, cell: cell[0] + cell[1] * edge, initial=0.0))
+    return edges
 
 
 def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -90,7 +90,9 @@ class FilmCoefficient:
     candidates: Mapping[str, Any]
 
 
-def select_film(model: str, section: ChannelSection, state: ChannelState) -> FilmCoefficient:
+def select_film(
+    model: str, section: ChannelSection, state: ChannelState, *, bounds: bool = True
+) -> FilmCoefficient:
     """Film coefficient of a helical rectangular channel by a named model.
 
     Parameters
@@ -98,6 +100,8 @@ def select_film(model: str, section: ChannelSection, state: ChannelState) -> Fil
     model : str
         One of ``FILM_MODELS``: ``helical``, ``paper``, or a correlation alone
         such as ``sieder_tate``.
+    bounds : bool
+        Whether low, high and candidates, most of the work, are wanted: without them both are the value.
 
     Raises
     ------
@@ -118,7 +122,7 @@ def select_film(model: str, section: ChannelSection, state: ChannelState) -> Fil
     """
     chosen = FILM_MODELS[model]
     flow, conductance, warnings = _flow_groups(section, state)
-    band = helical_band(flow)
+    band = helical_band(flow, bounds=bounds)
     answer = chosen.model(flow, band) if isinstance(chosen, NusseltCorrelation) else chosen(flow, band)
     value, in_range = answer.nusselt * conductance, answer.in_range
     regime = answer.regime
@@ -128,8 +132,8 @@ def select_film(model: str, section: ChannelSection, state: ChannelState) -> Fil
 
     # An extrapolated value is surrounded by more doubt than the correlations differ.
     widening = np.where(in_range, 1.0, EXTRAPOLATION_WIDENING)
-    low = np.minimum(band.low * conductance, value / widening)
-    high = np.maximum(band.high * conductance, value * widening)
+    low = np.minimum(band.low * conductance, value / widening) if bounds else value
+    high = np.maximum(band.high * conductance, value * widening) if bounds else value
     candidates = {name: _unwrap(number * conductance) for name, number in band.candidates.items()}
     return FilmCoefficient(
         value=_unwrap(value),
