@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import ConvergenceError, NoSteadyStateError, SpindleFemError
 from spindle_fem.model.mesh.linear_solvers import RELATIVE_TOLERANCE
-from spindle_fem.model.mesh.renewed_equations import RenewedEquations
-from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady
+from spindle_fem.model.mesh.steady_conduction import ConductionSolution, SteadySeries, solve_steady
 from spindle_fem.operation.circuits import capacity_rate
 from spindle_fem.operation.coolant_loop import CoolantState
 from spindle_fem.operation.loads import NO_CHANGE, LoadChange, Loads
@@ -173,7 +172,7 @@ class _Operation:
         self.loads: Loads | None = None
         self.coolant: CoolantState | None = None
         self.change = self.heat_before = np.inf
-        self._equations = RenewedEquations()
+        self._series = SteadySeries()
 
     def padded(self, field: NDArray[np.float64] | None) -> NDArray[np.float64]:
         """State of a field, ambient by default, with lumped nodes at ambient temperature."""
@@ -202,7 +201,7 @@ class _Operation:
             else replace(self.solution, temperature=field, lumped_temperature=state[n:]),
             preconditioner=None if self.solution is None else self.solution.preconditioner,
             relative_tolerance=_linear_tolerance(self.change),
-            equations=self._equations,
+            series=self._series,
         )
         self.lumped_known = True
         self.change = float(np.abs(self.solution.temperature - field).max())

@@ -13,21 +13,23 @@ CORRECTIONS = 8
 
 
 class RecentCorrections:
-    """Recent corrections of stages: the next one is nearly a combination of them.
+    """Recent corrections of solutions: the next one is nearly a combination of them.
 
-    What they store and conduct together is kept too, and used on when a film has
+    What they are to each other in the energies of some matrices is kept too, and used on when a film has
     changed a little: they only make first guesses.
+
+    Parameters
+    ----------
+    number : int
+        Of matrices whose sum is solved with.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, number: int) -> None:
         self._fields: NDArray[np.float64] | None = None
         self._count = 0
-        self._stored = np.zeros((CORRECTIONS, CORRECTIONS))
-        self._conducted = np.zeros((CORRECTIONS, CORRECTIONS))
+        self._energies = np.zeros((number, CORRECTIONS, CORRECTIONS))
 
-    def add(
-        self, correction: NDArray[np.float64], storage: sparse.csr_array, conduction: sparse.csr_array
-    ) -> None:
+    def add(self, correction: NDArray[np.float64], *matrices: sparse.csr_array) -> None:
         """Remember a correction that is not zero, (n,) [K]; the oldest is forgotten."""
         if self._fields is None:
             self._fields = np.zeros((CORRECTIONS, len(correction)))
@@ -35,14 +37,14 @@ class RecentCorrections:
         self._count += 1
         scaled = correction / np.abs(correction).max()
         self._fields[place] = scaled
-        for table, matrix in ((self._stored, storage), (self._conducted, conduction)):
+        for table, matrix in zip(self._energies, matrices, strict=True):
             table[place] = table[:, place] = self._fields @ multiply(matrix, scaled)
 
-    def combine(self, residual: NDArray[np.float64], shift: float) -> NDArray[np.float64]:
-        """Galerkin solution of ``(M + shift K) x = residual`` among the recent corrections."""
+    def combine(self, residual: NDArray[np.float64], *factors: float) -> NDArray[np.float64]:
+        """Galerkin solution of ``Σ factor · matrix · x = residual`` among the recent corrections."""
         size = min(self._count, CORRECTIONS)
         if not size:
             return np.zeros_like(residual)
         fields = self._fields[:size]
-        projected = self._stored[:size, :size] + shift * self._conducted[:size, :size]
+        projected = np.tensordot(factors, self._energies[:, :size, :size], axes=1)
         return np.linalg.lstsq(projected, fields @ residual, rcond=1e-9)[0] @ fields

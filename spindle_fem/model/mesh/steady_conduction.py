@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from spindle_fem.model.mesh.conduction_problem import (
     reference_temperature,
     require_surroundings,
 )
+from spindle_fem.model.mesh.first_guesses import RecentCorrections
 from spindle_fem.model.mesh.heat_balance import (
     BALANCE_TOLERANCE,
     LINEAR_BALANCE_TOLERANCE,
@@ -27,6 +28,7 @@ from spindle_fem.model.mesh.linear_solvers import (
     Method,
     Preconditioner,
     build_preconditioner,
+    multiply,
     solve_linear,
 )
 from spindle_fem.model.mesh.linear_system import ThermalSystem
@@ -80,6 +82,14 @@ class ConductionSolution:
         return float(self.lumped_temperature[self.problem.lumped_names.index(name)])
 
 
+@dataclass(frozen=True, slots=True)
+class SteadySeries:
+    """What problems without film laws on one mesh, solved one after the other, leave to the next."""
+
+    equations: RenewedEquations = field(default_factory=RenewedEquations)
+    recent: RecentCorrections = field(default_factory=lambda: RecentCorrections(1))
+
+
 def solve_steady(
     problem: ConductionProblem,
     guess: ConductionSolution | None = None,
@@ -89,7 +99,7 @@ def solve_steady(
     relative_tolerance: float = RELATIVE_TOLERANCE,
     nonlinear_tolerance: float = NONLINEAR_TOLERANCE_K,
     balance_tolerance: float | None = None,
-    equations: RenewedEquations | None = None,
+    series: SteadySeries | None = None,
 ) -> ConductionSolution:
     """Solve a steady problem; film laws by Newton's method.
 
@@ -108,8 +118,8 @@ def solve_steady(
     balance_tolerance : float, optional, [-]
         Largest relative difference of heat in and out; 1e-10 when linear and
         1e-8 with film laws unless given.
-    equations : RenewedEquations, optional
-        That problems without film laws on one mesh share.
+    series : SteadySeries, optional
+        Of problems that are solved one after the other.
 
     Raises
     ------
@@ -122,12 +132,17 @@ def solve_steady(
         return _solve_nonlinear(
             problem, guess, preconditioner, method, relative_tolerance, nonlinear_tolerance, balance_tolerance
         )
-    own = Equations.of(problem) if equations is None else equations.of(problem)
+    own = Equations.of(problem) if series is None else series.equations.of(problem)
     system, matrix, load = own.system, own.matrix, own.tied.full_load()
     if preconditioner is None:
         preconditioner = build_preconditioner(own.tied, method)
     start = None if guess is None else _start_values(system, guess)
-    solution = solve_linear(matrix, load, preconditioner, start, relative_tolerance=relative_tolerance)
+    near = start
+    if series is not None and start is not None:
+        near = start + series.recent.combine(load - multiply(matrix, start), 1.0)
+    solution = solve_linear(matrix, load, preconditioner, near, relative_tolerance=relative_tolerance)
+    if series is not None and start is not None and solution.iterations:
+        series.recent.add(solution.unknowns - start, matrix)
     unknowns = close_balance(matrix, load, solution.unknowns)
     rise, lumped_rise = split_unknowns(unknowns, system.n_lumped, system.tie)
     # Row sums of a stiff matrix are rounded; the films alone say what is still missing.

@@ -119,7 +119,7 @@ class StageSolver:
         self._n = self._tied_storage.shape[0]
         self._storage = system.tied().beside_full(self._tied_storage, np.diag(lumped_capacity))
         self._kept = _Kept()
-        self._recent = RecentCorrections()
+        self._recent = RecentCorrections(2)
         self._origin = (start.time, 1.0)
         self._shift = 0.0
         self._iteration = StageIteration()
@@ -174,7 +174,7 @@ class StageSolver:
         defect = error_defect(size, tuple(stage.rate for stage in stages))
         defect[self._n :][self._lumped_capacity == 0.0] = 0.0
         tolerance = ERROR_SOLVE_FRACTION * (self._control.tolerance or 1.0)
-        known = self._recent.combine(defect, self._shift)
+        known = self._recent.combine(defect, 1.0, self._shift)
         solution = solve_linear(
             self._kept.matrix, defect, self._kept.preconditioner, known, error_tolerance=tolerance
         )
@@ -296,7 +296,7 @@ class StageSolver:
         judge: bool,
     ) -> NDArray[np.float64]:
         kept = self._kept
-        known = self._recent.combine(right - multiply(matrix, guess), self._shift)
+        known = self._recent.combine(right - multiply(matrix, guess), 1.0, self._shift)
         solution = solve_linear(
             matrix,
             right,
