@@ -290,7 +290,8 @@ def _option(
     for expected, fit in zip(answers, fits, strict=True):
         means.append(expected.readings[:, chosen].T.ravel())
         slopes = expected.slopes[:, chosen].transpose(1, 0, 2).reshape(size * len(chosen), -1)
-        covariance = slopes @ fit.covariance @ slopes.T
+        of_fit = slopes @ _root(fit.covariance)
+        covariance = of_fit @ of_fit.T
         for position, channel in enumerate(chosen):
             own = slice(position * size, (position + 1) * size)
             covariance[own, own] += noise[channel]
@@ -330,7 +331,7 @@ def pairwise_distances(means: Sequence[Array], covariances: Sequence[Array]) -> 
     halves = [_half_log_det(item) for item in covariances]
     for i in range(count):
         for j in range(i):
-            lower = np.linalg.cholesky(0.5 * (covariances[i] + covariances[j]))
+            lower = _lower(0.5 * (covariances[i] + covariances[j]))
             scaled = solve_triangular(lower, means[i] - means[j], lower=True)
             volume = float(np.log(np.diag(lower)).sum()) - 0.5 * (halves[i] + halves[j])
             found[i, j] = found[j, i] = 0.125 * float(scaled @ scaled) + volume
@@ -338,7 +339,19 @@ def pairwise_distances(means: Sequence[Array], covariances: Sequence[Array]) -> 
 
 
 def _half_log_det(covariance: Array) -> float:
-    return float(np.log(np.diag(np.linalg.cholesky(covariance))).sum())
+    return float(np.log(np.diag(_lower(covariance))).sum())
+
+
+def _root(covariance: Array) -> Array:
+    """A matrix whose product with its transpose is the covariance, without what rounding left below zero."""
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+def _lower(covariance: Array) -> Array:
+    """Cholesky factor of a covariance with what rounding takes from its largest variance added to all."""
+    rounding = np.finfo(float).eps * len(covariance) * float(np.diag(covariance).max())
+    return np.linalg.cholesky(covariance + rounding * np.eye(len(covariance)))
 
 
 def expected_information(weights: Array, distances: Array) -> float:

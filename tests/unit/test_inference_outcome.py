@@ -270,6 +270,16 @@ def test_bhattacharyya_distance_of_equal_and_of_wide_gaussians():
     assert np.diag(found) == pytest.approx(0.0)
 
 
+def test_distances_stand_where_a_parameter_is_known_to_nothing_but_rounding():
+    slope = np.random.default_rng(1).normal(size=(60, 1))
+    vast = 1e13 * slope @ slope.T + 1e-2 * np.eye(60)
+    with pytest.raises(np.linalg.LinAlgError):
+        np.linalg.cholesky(vast)
+    found = pairwise_distances([np.zeros(60), np.ones(60)], [vast, np.eye(60)])
+    assert np.isfinite(found).all()
+    assert found[0, 1] > 1.0
+
+
 def test_information_is_at_most_the_entropy_of_the_explanations():
     weights = np.array([0.5, 0.25, 0.25])
     apart = 100.0 * (1.0 - np.eye(3))
