@@ -22,7 +22,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from spindle_fem.errors import ConvergenceError, GeometryError, MeshQualityError
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
-from spindle_fem.model.mesh.element_integrals import tetrahedron_table
+from spindle_fem.model.mesh.element_integrals import ReferenceTable, tetrahedron_table
 from spindle_fem.model.mesh.integration import ENTRIES_OF_QUADRATIC
 from spindle_fem.model.mesh.kernels import assembly_loops
 from spindle_fem.model.mesh.kernels.elasticity_loops import add_elements, multiply_blocks
@@ -152,7 +152,13 @@ class SolidBody:
     turning: Array
 
     @classmethod
-    def of(cls, mesh: SolidMesh, materials: Mapping[str, ElasticMaterial], rise: Array) -> SolidBody:
+    def of(
+        cls,
+        mesh: SolidMesh,
+        materials: Mapping[str, ElasticMaterial],
+        rise: Array,
+        table: ReferenceTable | None = None,
+    ) -> SolidBody:
         """Integrate a body.
 
         Parameters
@@ -160,6 +166,8 @@ class SolidBody:
         materials : mapping of part to ElasticMaterial
         rise : (n_nodes of the thermal mesh,) ndarray, [K]
             How much warmer than as assembled.
+        table : ReferenceTable, optional
+            Element at its quadrature points; by default those of the temperatures.
 
         Raises
         ------
@@ -171,7 +179,7 @@ class SolidBody:
         own_rise = np.zeros(n)
         own_rise[mesh.local[mesh.local >= 0]] = rise[mesh.local >= 0]
         blocks, expansion = np.zeros((len(pattern.indices), 3, 3)), np.zeros((n, 3))
-        turning, table = np.zeros((n, 3)), tetrahedron_table(2)
+        turning, table = np.zeros((n, 3)), tetrahedron_table(2) if table is None else table
         inverted = add_elements(
             mesh.points,
             unsigned(np.ascontiguousarray(mesh.tetrahedra))[0],
