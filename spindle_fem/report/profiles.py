@@ -28,9 +28,9 @@ class MeridianSection:
     Attributes
     ----------
     faces : TriangleSet
-        One value: temperature in K; labelled by part.
+        One value, temperature in K, or displacements along x, y, z in m; labelled by part.
     outlines : SegmentSet
-        Outlines of the parts with their temperature in K.
+        Outlines of the parts with the same.
     """
 
     faces: TriangleSet
@@ -38,12 +38,18 @@ class MeridianSection:
     part_names: tuple[str, ...]
 
 
-def meridian_section(mesh: TaggedMesh, temperature: NDArray[np.float64]) -> MeridianSection:
-    """Cut the machine along the vertical plane through its axis."""
+def meridian_section(mesh: TaggedMesh, values: NDArray[np.float64]) -> MeridianSection:
+    """Cut the machine along the vertical plane through its axis, with values (n_nodes,) or (n_nodes, k)."""
     level = mesh.points[:, 0]
     return MeridianSection(
-        section_of_volume(mesh, temperature, level), boundary_lines(mesh, temperature, level), mesh.part_names
+        section_of_volume(mesh, values, level), boundary_lines(mesh, values, level), mesh.part_names
     )
+
+
+def displacement_section(result: ThermalResult) -> MeridianSection | None:
+    """The same with displacements [m]; None where growth was not worked out in three dimensions."""
+    moved = result.solid_growth
+    return None if moved is None else meridian_section(result.mesh, moved.displacement)
 
 
 def temperature_scale(result: ThermalResult) -> ColourBar:

@@ -33,6 +33,7 @@ CAPTIONS = {
     "channel_walls": "Walls of the channel, seen without the housing.",
     "heat_balance": "Where the heat comes from and where it goes.",
     "deformed_machine": "The machine as it has grown since assembly, exaggerated as its title says.",
+    "deformed_section": "The same in three dimensions, cut along the vertical plane through the axis.",
     "mesh": "The mesh, opened along the vertical plane; colours are parts.",
 }
 

@@ -31,9 +31,10 @@ if TYPE_CHECKING:
     from spindle_fem.physics.bearings.seat_contact import SeatBodies
     from spindle_fem.report.block_page import Illustration
     from spindle_fem.report.drawn_surfaces import SegmentSet
+    from spindle_fem.report.profiles import MeridianSection
     from spindle_fem.results.thermal_result import ThermalResult
 
-_SHADED = ("meridian_temperature", "deformed_machine")  # a palette would show as bands
+_SHADED = ("meridian_temperature", "deformed_machine", "deformed_section")  # a palette would show as bands
 _MESH_COLOURS = 192
 _CHART_COLOURS = 256
 
@@ -98,9 +99,9 @@ class OutputHelpers:
         """Whether a result's files are being written to this folder."""
         return self._begun == folder
 
-    def draw_growth(self, shapes: Mapping[str, BodyShape]) -> None:
-        """Write how the bodies of the result begun have grown."""
-        self._waiting["growth"] = self._charts.ask("write_growth", dict(shapes))
+    def draw_growth(self, shapes: Mapping[str, BodyShape], section: MeridianSection | None) -> None:
+        """Write how the bodies of the result begun have grown; ``section`` with displacements."""
+        self._waiting["growth"] = self._charts.ask("write_growth", dict(shapes), section)
 
     def wait(self) -> dict[str, float]:
         """Wait for all that was begun; seconds of each part."""
@@ -146,6 +147,7 @@ def write_outputs(
     if helpers is None:
         with OutputHelpers() as own:
             return write_outputs(result, folder, started=started, notify=notify, helpers=own)
+    from spindle_fem.report.profiles import displacement_section
     from spindle_fem.results.field_file import write_fields
     from spindle_fem.results.run_summary import build_summary, peak_memory_MB
 
@@ -155,7 +157,7 @@ def write_outputs(
         helpers.begin(result, folder)
     try:
         with clock.step("fields"):
-            helpers.draw_growth(result.shapes)
+            helpers.draw_growth(result.shapes, displacement_section(result))
             write_fields(result, folder / "fields.vtu")
     finally:  # also after an error nothing must go on writing here
         with clock.step("pictures"):
@@ -305,16 +307,17 @@ class _ChartWorker:
         self._write_all(draw_charts(self._result))
         return time.perf_counter() - began
 
-    def write_growth(self, shapes: Mapping[str, BodyShape]) -> float:
-        """Write the growth of the bodies and the picture of the deformed machine; return the seconds."""
-        from spindle_fem.report.growth_chart import deformed_machine
+    def write_growth(self, shapes: Mapping[str, BodyShape], section: MeridianSection | None) -> float:
+        """Write the growth of the bodies and pictures of the deformed machine; return the seconds."""
+        from spindle_fem.report.growth_chart import deformed_machine, deformed_section
         from spindle_fem.results.dataset import write_dataset
         from spindle_fem.results.growth_file import GROWTH_GROUP, growth_dataset
 
         began = time.perf_counter()
         if shapes:
             write_dataset(growth_dataset(shapes), self._folder / "result.nc", group=GROWTH_GROUP)
-        self._write_all({"deformed_machine": lambda: deformed_machine(shapes)})
+        drawn = {"deformed_machine": lambda: deformed_machine(shapes)}
+        self._write_all(drawn | {"deformed_section": lambda: deformed_section(section)})
         return time.perf_counter() - began
 
     def write_report(self, summary: dict[str, Any], pictures: Mapping[str, Illustration]) -> None:

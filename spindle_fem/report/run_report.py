@@ -124,7 +124,7 @@ def render_run_report(
         nose = tables.nose_table(summary)
         read = tables.displacement_table(summary)
         shown = [
-            *_drawn(illustrations, "deformed_machine"),
+            *_drawn(illustrations, "deformed_machine", "deformed_section"),
             tables.growth_table(summary),
             *(table for table in (tables.spacer_table(summary), nose, read) if table.rows),
             *_equilibrium(summary),

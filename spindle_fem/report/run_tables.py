@@ -282,9 +282,12 @@ def spacer_table(summary: Mapping[str, Any]) -> Table:
 
 def displacement_table(summary: Mapping[str, Any]) -> Table:
     """Readings of the displacement sensors."""
-    fields = (words("sensor", itemgetter(0)), fixed("displacement / µm", itemgetter(1), 2))
+    fields = [words("sensor", itemgetter(0)), fixed("displacement / µm", itemgetter(1), 2)]
+    solid = summary["growth"].get("three_dimensional", {}).get("displacements", {})
+    if solid:
+        fields.append(fixed("in three dimensions / µm", lambda item: solid[item[0]], 2))
     caption = "What the displacement sensors read since assembly."
-    return table_of(fields, summary.get("displacements", {}).items(), caption)
+    return table_of(tuple(fields), summary.get("displacements", {}).items(), caption)
 
 
 def nose_table(summary: Mapping[str, Any]) -> Table:

@@ -200,7 +200,7 @@ def _growth(growth: Growth, solid: SolidGrowth | None) -> dict[str, Any]:
         "growth": {
             **_shape(growth, seats, raceways),
             "spacers": {name: {"length_um": 1e6 * value} for name, value in growth.spacers.items()},
-            **({} if solid is None else {"three_dimensional": _shape(solid, solid.seats, solid.raceways)}),
+            **({} if solid is None else {"three_dimensional": _solid_shape(solid)}),
         },
         "fits": fits,
     }
@@ -229,6 +229,11 @@ def _shape(
     for (bearing, side), value in seats.items():
         found["seats"].setdefault(bearing, {})[f"{side}_um"] = 1e6 * value
     return found
+
+
+def _solid_shape(solid: SolidGrowth) -> dict[str, Any]:
+    read = {name: 1e6 * value for name, value in solid.displacements.items()}
+    return {**_shape(solid, solid.seats, solid.raceways), "displacements": read}
 
 
 def _equilibrium(found: Equilibrium) -> dict[str, Any]:

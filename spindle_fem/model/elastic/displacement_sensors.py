@@ -38,6 +38,8 @@ class SensorSight:
         0 for a radial sensor, else the direction along z that counts positive.
     mount : Face or None
         Place on the housing that its holder follows; None: the plane behind the flange.
+    hangs_at : (z, r) or None, [m]
+        That place where it is a single spot.
     """
 
     name: str
@@ -46,6 +48,7 @@ class SensorSight:
     angle: float | None
     axial: int
     mount: Face | None = None
+    hangs_at: tuple[float, float] | None = None
 
     @property
     def key(self) -> str:
@@ -110,4 +113,5 @@ def _sight(sensor: DisplacementSensor, layout: Layout, mesh: TaggedMesh, housing
     else:
         z, r, angle = sensor.at.z, sensor.at.radius, sensor.at.angle
     away = 1 if z > behind else -1
-    return SensorSight(sensor.name, z, r, angle, away if sensor.direction == "axial" else 0, mount)
+    spot = None if isinstance(sensor.mount, str) else (sensor.mount.z, sensor.mount.radius)
+    return SensorSight(sensor.name, z, r, angle, away if sensor.direction == "axial" else 0, mount, spot)

@@ -23,6 +23,7 @@ from spindle_fem.model.elastic.machine_bodies import Seat, elastic_material
 from spindle_fem.model.elastic.machine_growth import GrowthModel, Side, flange_back
 from spindle_fem.model.elastic.solid_body import SolidBody, SolidMesh, rigid_motions
 from spindle_fem.model.elastic.solid_facets import Facets, lie_on, met, on_face, outside_of
+from spindle_fem.model.elastic.solid_readings import solid_readings
 
 Array = NDArray[np.float64]
 
@@ -42,6 +43,8 @@ class SolidGrowth:
     nose_radial, nose_tilt : (up, across) or None, [m], [rad]
         Of that face, and of the axis between two bearing sets; as in
         :class:`~spindle_fem.model.elastic.machine_growth.Growth`.
+    displacements : mapping of str to float, [m]
+        Readings of the displacement sensors.
     """
 
     displacement: Array
@@ -50,6 +53,7 @@ class SolidGrowth:
     nose_axial: float | None
     nose_radial: tuple[float, float] | None
     nose_tilt: tuple[float, float] | None
+    displacements: Mapping[str, float]
 
 
 class _Placing:
@@ -214,4 +218,5 @@ def solid_growth(
         -z if held else None,
         (y, -x) if bent else None,
         (float(turn[1]), -float(turn[0])) if bent else None,
+        solid_readings(model, mesh, shift),
     )
