@@ -67,7 +67,7 @@ REAR = Bearing(13.494e-3, 27, 0.1425, 0.120, 0.165, 0.022, 0.135, 0.150)
 
 @dataclass(slots=True)
 class Warmth:
-    """Temperatures around the bearings of a set, (k,) °C each."""
+    """Temperatures around the bearings of a set, (k,) °C each; that of the housing stands for its growth."""
 
     inner: Array
     outer: Array
@@ -80,8 +80,8 @@ class BallSet:
     """A locked set.
 
     ``sides`` +1 where thrust towards the rear loads a bearing; ``places`` of the middles along the axis.
-    ``clearance`` and ``interference`` on the diameter. ``wall`` is the share of the housing's free growth
-    that its cold outside leaves, ``yielding`` that of an outer ring's overlap that the housing gives.
+    ``clearance`` on the diameter. ``wall`` is how much of its growth the housing has, ``yielding`` the share
+    of an outer ring's overlap that it gives.
     """
 
     bearing: Bearing
@@ -89,8 +89,8 @@ class BallSet:
     places: tuple[float, ...]
     preload: float
     clearance: float
-    wall: float = 0.45
-    yielding: float = 0.3
+    wall: float = 1.0
+    yielding: float = 0.2
     _last: Array | None = field(default=None, init=False, repr=False)
     _lock: Array | None = field(default=None, init=False, repr=False)
 
@@ -152,16 +152,17 @@ class BallSet:
         b = self.bearing
         rise = [value - ASSEMBLED_AT for value in (warmth.inner, warmth.outer, warmth.shaft, warmth.housing)]
         inner_ring, outer_ring, shaft, housing = rise
-        # A thin ring that is tight on the shaft follows it; its own warmth adds in its wall.
-        wall = 0.5 * (b.inner_shoulder - b.bore)
-        inner = STEEL_EXPANSION * (0.5 * b.bore * (0.7 * shaft + 0.3 * inner_ring) + wall * inner_ring)
+        # A thin ring tight on the shaft follows it; its own warmth adds up to the bottom of its groove.
+        wall = 0.5 * (b.pitch - b.ball - b.bore)
+        inner = STEEL_EXPANSION * (0.5 * b.bore * (0.9 * shaft + 0.1 * inner_ring) + wall * inner_ring)
         inner = inner - 0.1 * self._hoop() * radial
-        free = 0.5 * b.outside * STEEL_EXPANSION * outer_ring + self._hoop() * radial
+        spread = self._hoop() * radial
+        outer = 0.5 * (b.pitch + b.ball) * STEEL_EXPANSION * outer_ring + spread
         room = 0.5 * self.clearance + 0.5 * b.outside * IRON_EXPANSION * self.wall * housing
-        overlap = free - room
+        overlap = 0.5 * b.outside * STEEL_EXPANSION * outer_ring + spread - room
         # Smooth over a tenth of a micrometre where the ring meets its seat.
         overlap = 1e-7 * np.logaddexp(0.0, overlap / 1e-7)
-        return inner - (free - (1.0 - self.yielding) * overlap)
+        return inner - (outer - (1.0 - self.yielding) * overlap)
 
     def _hoop(self) -> float:
         """How far a newton of radial ball force spreads the free outer ring, m."""

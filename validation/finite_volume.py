@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from . import machine as m
-from .nose_growth import nose_shift
+from .nose_growth import growth_by_cell
 
 Groups = dict[str, tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]
 
@@ -318,13 +318,9 @@ def _read(b: _Builder, readings: dict[str, NDArray[np.float64]]) -> None:
         vector = np.zeros(b.size)
         np.add.at(vector, b.index[chosen], volume[chosen])
         readings[f"mean:{name}"] = vector / vector.sum()
-    # Not a mean: m/K, of a cell's sectors one share each.
+    # Not a mean, and of the nose in m/K; of a cell's sectors one share each.
     i, t, k = np.nonzero(b.index >= 0)
-    cell = nose_shift(b.grid)
-    vector = np.zeros(b.size)
-    np.add.at(vector, b.index[i, t, k], (cell / np.maximum((b.index >= 0).sum(axis=1), 1))[i, k])
-    readings["growth:nose"] = vector
-    for bearing in m.BEARINGS:
-        (z0, z1, _, radius) = m._STANDING[f"{bearing}.outer"][0]
-        vector = b.weights(b.boundary("r", radius * 1e-3, z0 * 1e-3, z1 * 1e-3, -1))
-        readings[f"seat:{bearing}"] = vector / vector.sum()
+    for name, cell in growth_by_cell(b.grid).items():
+        vector = np.zeros(b.size)
+        np.add.at(vector, b.index[i, t, k], (cell / np.maximum((b.index >= 0).sum(axis=1), 1))[i, k])
+        readings[f"growth:{name}"] = vector

@@ -41,6 +41,9 @@ PRELOAD = 1137.2
 LARGEST = (1.12, 1.9)
 # Share of the friction that follows the load: to begin with, at most; tries to find it.
 SHARE, MOST_SHARE, TRIES = 0.3, 0.85, 8
+# Growth of the housing over that of its drawing and temperatures. Under a thin ring (4.4e-12 m/Pa) a seat
+# gives 0.7e-12 m/Pa alone, with its neighbours pressed as well up to 1.4e-12.
+WALL, YIELDING = (0.8, 1.2), (0.12, 0.25)
 # Share by which heat over speed is off what its table says, highest speed of that in rpm.
 TABLE, HIGHEST, SETS_OF_BEARINGS = 0.05, 4500.0, ("F", "R")
 # s; ball loads are worked out anew this often.
@@ -119,7 +122,7 @@ class CoupledPreload(Law):
         names = [m.BEARINGS[i] for i in SETS[self.where]]
         inner, outer, housing = (
             np.array([moment.read(form.format(name)) for name in names])
-            for form in ("mean:{}.inner", "mean:{}.outer", "seat:{}")
+            for form in ("mean:{}.inner", "mean:{}.outer", "growth:{}")
         )
         return Warmth(inner, outer, np.full(len(names), moment.read(SPACER[self.where])), housing)
 
@@ -153,8 +156,8 @@ def draw_coupled(rng: np.random.Generator, model: ReducedSpindle, plan: Plan, bu
     form = {
         "share": SHARE,
         "power": float(rng.uniform(0.4, 0.6)),
-        "wall": float(rng.uniform(0.3, 0.6)),
-        "yielding": float(rng.uniform(0.2, 0.5)),
+        "wall": float(rng.uniform(*WALL)),
+        "yielding": float(rng.uniform(*YIELDING)),
     }
     wanted = float(np.exp(rng.uniform(*np.log(LARGEST))))
     for _ in range(TRIES):

@@ -67,6 +67,11 @@ _Z_STATIONS = (
 )  # fmt: skip
 
 
+def standing(part: str) -> tuple[tuple[float, float, float, float], ...]:
+    """Rectangles of a part that stands, mm: z from, z to, r from, r to."""
+    return _STANDING[part]
+
+
 def material_of(part: str) -> tuple[float, float]:
     """Conductivity, W/(m K), and volumetric heat capacity, J/(m³ K), of a part."""
     if part in ("housing", "cover"):

@@ -1,4 +1,4 @@
-"""How far the nose moves from the flange, by the elasticity of shaft and housing in the meridian plane.
+"""How far the nose moves from the flange and seats of the housing open, by elasticity in the meridian plane.
 
 Biquadratic elements, one for each cell of the finite volumes, on displacements along r and z. A body is
 free but for one point; the channel's turns are rings where a few cuts through the helix have them. A shift
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
 from . import machine as m
 
@@ -26,6 +26,8 @@ SEAT, ON_SHAFT, IN_BORE = (0.113, 0.137), 0.070, 0.095
 SPOT, BACK = (0.0, 0.060), (0.065, 0.150, 0.190)
 # Cuts through the helix whose rings stand for it.
 CUTS = 4
+# Directions of a displacement: along r, along z.
+ACROSS, ALONG = 0, 1
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
@@ -57,10 +59,11 @@ class Body:
         columns = (2 * k)[:, None, None] + step
         return (rows * along + columns).reshape(len(i), 9)
 
-    def by_cell(self, shift: Array) -> Array:
-        """What one kelvin of each cell adds to a shift, (nr, nz) m/K.
+    def by_cell(self, *shifts: Array) -> Array:
+        """What one kelvin of each cell adds to every shift, (k, nr, nz) m/K.
 
-        ``shift`` (2 nr + 1, 2 nz + 1) are weights of the displacement along z at lines and their middles.
+        ``shifts`` (2, 2 nr + 1, 2 nz + 1) are weights of the displacement along r, then along z, at lines and
+        their middles.
         """
         i, k = np.nonzero(self.solid)
         nodes = self._nodes()
@@ -97,36 +100,41 @@ class Body:
         whole = sparse.coo_matrix((matrices.ravel(), (rows.ravel(), columns.ravel())), shape=(n, n)).tocsc()
         # One point is kept from moving along the axis; what counts between two places does not see it.
         free = np.delete(np.arange(n), len(used))
-        asked = np.concatenate([np.zeros(len(used)), shift.ravel()[used]])
-        adjoint = np.zeros(n)
-        adjoint[free] = spsolve(whole[free][:, free], asked[free])
-        found = np.zeros(self.solid.shape)
-        found[i, k] = np.einsum("cj,cj->c", adjoint[unknowns], loads)
+        asked = np.array([shift.reshape(2, -1)[:, used].ravel() for shift in shifts])
+        adjoint = np.zeros((len(shifts), n))
+        adjoint[:, free] = splu(whole[free][:, free]).solve(asked[:, free].T).T
+        found = np.zeros((len(shifts), *self.solid.shape))
+        found[:, i, k] = np.einsum("scj,cj->sc", adjoint[:, unknowns], loads)
         return found
 
-    def mean_on_cylinder(self, radius: float, low: float, high: float) -> Array:
-        """Weights of the mean shift along z of a cylinder between two z."""
-        found = np.zeros((2 * len(self.r) - 1, 2 * len(self.z) - 1))
+    def mean_on_cylinder(self, radius: float, low: float, high: float, axis: int = ALONG) -> Array:
+        """Weights of the mean shift of a cylinder between two z."""
+        found = self._none()
         line = 2 * int(np.argmin(np.abs(self.r - radius)))
         for k in np.flatnonzero((self.z[:-1] > low - 1e-7) & (self.z[1:] < high + 1e-7)):
-            found[line, 2 * k : 2 * k + 3] += np.array([1.0, 4.0, 1.0]) * (self.z[k + 1] - self.z[k])
+            found[axis, line, 2 * k : 2 * k + 3] += np.array([1.0, 4.0, 1.0]) * (self.z[k + 1] - self.z[k])
         return found / found.sum()
 
     def mean_on_plane(self, z: float, low: float, high: float) -> Array:
         """Weights of the mean shift along z of a ring-shaped plane between two radii."""
-        found = np.zeros((2 * len(self.r) - 1, 2 * len(self.z) - 1))
+        found = self._none()
         line = 2 * int(np.argmin(np.abs(self.z - z)))
         for i in np.flatnonzero((self.r[:-1] > low - 1e-7) & (self.r[1:] < high + 1e-7)):
             middle = 0.5 * (self.r[i] + self.r[i + 1])
             weights = np.array([self.r[i], 4.0 * middle, self.r[i + 1]])
-            found[2 * i : 2 * i + 3, line] += weights * (self.r[i + 1] - self.r[i])
+            found[ALONG, 2 * i : 2 * i + 3, line] += weights * (self.r[i + 1] - self.r[i])
         return found / found.sum()
 
     def at_spot(self, z: float, radius: float) -> Array:
         """Weight of the shift along z of a point where lines of the grid cross."""
-        found = np.zeros((2 * len(self.r) - 1, 2 * len(self.z) - 1))
-        found[2 * int(np.argmin(np.abs(self.r - radius))), 2 * int(np.argmin(np.abs(self.z - z)))] = 1.0
+        found = self._none()
+        found[ALONG, 2 * int(np.argmin(np.abs(self.r - radius))), 2 * int(np.argmin(np.abs(self.z - z)))] = (
+            1.0
+        )
         return found
+
+    def _none(self) -> Array:
+        return np.zeros((2, 2 * len(self.r) - 1, 2 * len(self.z) - 1))
 
 
 def _lagrange(x: float) -> tuple[Array, Array]:
@@ -137,17 +145,24 @@ def _lagrange(x: float) -> tuple[Array, Array]:
     )
 
 
-def nose_shift(grid: m.Grid) -> Array:
-    """How far forward the sensor's spot moves from the flange's back by a kelvin of each cell, (nr, nz) m/K.
+def growth_by_cell(grid: m.Grid) -> dict[str, Array]:
+    """What a kelvin of each cell does, (nr, nz): to the nose, m/K, and to every seat of the housing.
 
+    ``nose``: how far forward the sensor's spot moves from the flange's back. Of a bearing: what opens its
+    seat, as weights of the temperature at which a housing that is as warm all over opens it as far.
     Cells of shaft, housing and cover; a cell of the channel's turns counts with the mean of what is solid.
     """
     parts = {name: grid.part == m.PARTS.index(name) for name in ("shaft", "housing", "cover")}
     shaft = Body(grid.r, grid.z, parts["shaft"], *SHAFT)
-    found = shaft.by_cell(shaft.mean_on_cylinder(ON_SHAFT, *SEAT) - shaft.at_spot(*SPOT))
+    forward = shaft.mean_on_cylinder(ON_SHAFT, *SEAT) - shaft.at_spot(*SPOT)
+    found = np.zeros((1 + len(m.BEARINGS), *grid.part.shape))
+    found[0] = shaft.by_cell(forward)[0]
+    seats = [1e-3 * np.array(m.standing(f"{name}.outer")[0])[[3, 0, 1]] for name in m.BEARINGS]
     for sector in np.arange(CUTS) * grid.sectors // CUTS:
         solid = (parts["housing"] & ~grid.wet[:, sector]) | parts["cover"]
         housing = Body(grid.r, grid.z, solid, *HOUSING)
         back = housing.mean_on_plane(*BACK)
-        found += housing.by_cell(back - housing.mean_on_cylinder(IN_BORE, *SEAT)) / CUTS
-    return found
+        openings = [housing.mean_on_cylinder(*seat, axis=ACROSS) for seat in seats]
+        found += housing.by_cell(back - housing.mean_on_cylinder(IN_BORE, *SEAT), *openings) / CUTS
+    found[1:] /= found[1:].sum(axis=(1, 2), keepdims=True)
+    return dict(zip(("nose", *m.BEARINGS), found, strict=True))
