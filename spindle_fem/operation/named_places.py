@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import AnnulusSegment, MachineSpec
 from spindle_fem.errors import SpecError
-from spindle_fem.machine.view.place_names import ACROSS, UP, ringed_probes, sided_names
+from spindle_fem.machine.view.place_names import ACROSS, UP, growth_names, ringed_probes, sided_names
+from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.model.mesh.thermal_operators import ThermalOperators
 from spindle_fem.operation.machine_loads import LoadsBuilder
 from spindle_fem.operation.probe_places import around_places, harmonics, near_places
@@ -90,6 +91,28 @@ def named_places(machine: MachineOnMesh, lumped: tuple[str, ...], size: int) -> 
         if mean is not None:
             for prefix, harmonic in zip((UP, ACROSS), harmonics(operators, mean), strict=True):
                 yield prefix + name, np.concatenate((harmonic, np.zeros(size - len(harmonic))))
+
+
+def growth_places(growth: GrowthModel, size: int) -> Iterator[tuple[str, Array]]:
+    """Every seat of bearings with fits on shaft and housing, with weights of the temperature of its growth.
+
+    That is the one at which the body, as warm all over, grows as far there; the weights sum to 1, and some
+    are negative.
+
+    Parameters
+    ----------
+    size : int
+        As of :func:`named_places`.
+
+    Yields
+    ------
+    str, (size,) ndarray
+    """
+    names = growth_names(growth.spec)
+    for ring, rows in zip(growth.rings, growth.seat_rows, strict=True):
+        if ring.seat.bearing in names:
+            name = names[ring.seat.bearing][0 if ring.seat.is_inner else 1]
+            yield name, np.concatenate((rows / rows.sum(), np.zeros(size - len(rows))))
 
 
 def place_load(spec: MachineSpec, operators: ThermalOperators, place: str) -> Array:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from spindle_fem.effects.framework.preload_response import PreloadResponse
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.machine.view.machine_names import MachineNames
-from spindle_fem.machine.view.part_roles import Layout
+from spindle_fem.machine.view.place_names import growth_names
 from spindle_fem.model.elastic.machine_bodies import MachineBodies, carries_rings, machine_bodies
 from spindle_fem.model.elastic.ring_seats import RingSeats
 from spindle_fem.operation.bearing_heat import BearingMechanics
@@ -35,7 +35,7 @@ from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
 
-FORMAT = "spindle-fem/preload-response/2"
+FORMAT = "spindle-fem/preload-response/3"
 # K; of rings, at which the shaft's part in what they do is taken.
 REFERENCE_DIFFERENCE = 10.0
 # K; denser where balls of one side lose their load and where rings meet the housing.
@@ -53,11 +53,8 @@ PUT_BETWEEN = 2
 HIGHEST_SPEED = 1.5
 # Where heat is by table nothing says which law made it; the analytical one knows the load of every contact.
 LEVEL_OF_TABLES = "full"
-# m
-ON_LINE = 1.0e-9
-# Parts of housing and shaft that move the seats of a set by less than this share are left out.
-LEAST_SHARE = 0.03
-
+# What is a kelvin warmer in turn.
+INNER_RINGS, OUTER_RINGS, SHAFT, HOUSING = range(4)
 
 _known: dict[str, PreloadResponse] = {}
 
@@ -83,12 +80,15 @@ class PreloadMechanics:
             return None
         if self.spec.lubricant_of(group) is None or not carries_rings(self.spec):
             return None
-        digest = _digest(self.spec, group.name, self.places)
+        known = growth_names(self.spec)
+        if not all(self.places.issuperset(known[bearing.name]) for bearing in group.bearing):
+            return None
+        digest = _digest(self.spec, group.name)
         if digest not in _known:
             path = cache_directory() / f"preload-{digest}.npz"
             found = load_record(path, FORMAT, PreloadResponse)
             if found is None:
-                _known[digest] = _solved(self.spec, group, self.places)
+                _known[digest] = _solved(self.spec, group)
                 save_record(_known[digest], path, FORMAT)
             else:
                 _known[digest] = PreloadResponse(**found)
@@ -102,7 +102,7 @@ def machine_view(names: MachineNames, recording: Recording) -> MachineView:
     )
 
 
-def _digest(spec: MachineSpec, group: str, places: Collection[str]) -> str:
+def _digest(spec: MachineSpec, group: str) -> str:
     """Hash of all inputs of a set's response."""
     content = spec.model_dump(mode="json")
     # without quantities that a calibration moves
@@ -112,21 +112,17 @@ def _digest(spec: MachineSpec, group: str, places: Collection[str]) -> str:
     ]
     known = [content[key] for key in ("part", "materials", "bearing_types", "grease", "channel", "operation")]
     heat = {k: v for k, v in content["heat"].items() if k not in ("ball_share", "inner_share")}
-    own = [source_digest(__name__), group, sets, known, heat, sorted(places)]
+    own = [source_digest(__name__), group, sets, known, heat]
     return hashlib.sha256(json.dumps(own, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def _solved(spec: MachineSpec, group: BearingSet, places: Collection[str]) -> PreloadResponse:
+def _solved(spec: MachineSpec, group: BearingSet) -> PreloadResponse:
     """Solve a set over all differences, gaps, speeds and thrusts."""
     bodies = machine_bodies(spec)
     seating = RingSeats(spec, bodies)
     names = [bearing.name for bearing in group.bearing]
-    rows, shaft, housing = _rows(spec, bodies, seating, places)
-    rows = rows[[seating.bearings.index(name) for name in names]]
-    ends = np.cumsum([2, len(shaft)])
-    inner_rings, outer = rows[:, :, 0], rows[:, 1, 1]
-    seat, opening = rows[:, 0, 2 : ends[1]].mean(axis=0), rows[:, 1, ends[1] :].mean(axis=0)
-    turning = inner_rings + rows[:, :, 2 : ends[1]].sum(axis=2)
+    rows = _rows(bodies, seating)[[seating.bearings.index(name) for name in names]]
+    turning = rows[:, :, INNER_RINGS] + rows[:, :, SHAFT]
     seats = seating.of_set(names)
     mechanics = BearingMechanics(spec, {group.name: seats})
     level = LEVEL_OF_TABLES if spec.heat.model == "table" else spec.heat.model
@@ -149,10 +145,11 @@ def _solved(spec: MachineSpec, group: BearingSet, places: Collection[str]) -> Pr
     ]
     differences, values = _finer(DIFFERENCES, np.moveaxis(np.array(friction), 3, 0), 0)
     gaps, values = _finer(GAPS, values, 1)
-    alone = replace(set_solver, turning=inner_rings)
+    alone = replace(set_solver, turning=rows[:, :, INNER_RINGS])
     at = (group.fit.outer_clearance / 2.0, spec.operation.speed, loads[len(loads) // 2])
     of_rings, of_all = (solver.log_ratio(REFERENCE_DIFFERENCE, *at).mean() for solver in (alone, set_solver))
-    by_shaft = float(1.0 - of_rings / of_all)
+    by_shaft, count = float(1.0 - of_rings / of_all), len(names)
+    seats_on, seats_in = zip(*(growth_names(spec)[name] for name in names), strict=True)
     return PreloadResponse(
         tuple(names),
         differences,
@@ -163,19 +160,12 @@ def _solved(spec: MachineSpec, group: BearingSet, places: Collection[str]) -> Pr
         group.fit.outer_clearance,
         _fit_sigma(spec.bearing_types[group.bearing_type].outer_diameter),
         group.assembly_temperature,
-        float(-outer.mean()),
-        _main_ones(housing, opening, float(opening.sum())),
-        _main_ones(shaft, seat, by_shaft),
+        float(-rows[:, 1, OUTER_RINGS].mean()),
+        dict(zip(seats_in, (rows[:, 1, HOUSING] / count).tolist(), strict=True)),
+        dict.fromkeys(seats_on, by_shaft / count),
         spec.operation.speed,
         spec.operation.thrust,
     )
-
-
-def _main_ones(places: Sequence[str], shares: Array, total: float) -> dict[str, float]:
-    """Places that have more than ``LEAST_SHARE`` of all, with theirs of a total."""
-    kept = np.abs(shares) > LEAST_SHARE * np.abs(shares).sum()
-    own = shares[kept] * (total / shares[kept].sum())
-    return dict(zip(np.array(places)[kept].tolist(), own.tolist(), strict=True))
 
 
 def _finer(points: Sequence[float], values: Array, axis: int) -> tuple[Array, Array]:
@@ -186,33 +176,15 @@ def _finer(points: Sequence[float], values: Array, axis: int) -> tuple[Array, Ar
     return dense, PchipInterpolator(np.array(points), values, axis=axis)(dense)
 
 
-def _rows(
-    spec: MachineSpec, bodies: MachineBodies, seating: RingSeats, places: Collection[str]
-) -> tuple[Array, list[str], list[str]]:
-    """Shifts by a kelvin of inner rings, outer rings, each place of shaft and of housing; these places."""
-    layout = Layout(spec, set(places))
-    parts, found = {}, {}
-    for name in (bodies.shaft, bodies.housing):
-        parts[name] = [part for part in spec.part if part.name in bodies.parts[name]]
-        own = [layout.segment_place(part, item.name) for part in parts[name] for item in part.segment]
-        found[name] = list(dict.fromkeys(own))
-    columns = [*found[bodies.shaft], *found[bodies.housing]]
+def _rows(bodies: MachineBodies, seating: RingSeats) -> Array:
+    """Shifts (n_bearings, 4, 4) by a kelvin of inner rings, of outer rings, of the shaft, of the housing."""
+    columns = {bodies.shaft: SHAFT, bodies.housing: HOUSING}
     values = {}
     for name, body in bodies.bodies.items():
-        z, r = body.section.mesh.p
-        values[name] = np.zeros((z.size, 2 + len(columns)))
-        if name not in parts:
-            values[name][:, 0 if name.endswith(".inner_ring") else 1] = 1.0
-            continue
-        for part in parts[name]:
-            for item in part.segment:
-                inside = (z >= item.z[0] - ON_LINE) & (z <= item.z[1] + ON_LINE)
-                inside &= r >= 0.5 * item.inner_diameter - ON_LINE
-                inside &= r <= 0.5 * item.outer_diameter + ON_LINE
-                values[name][inside, 2 + columns.index(layout.segment_place(part, item.name))] = 1.0
-        values[name] /= values[name].sum(axis=1, keepdims=True)
-    rows = seating.thermal_rows(*seating.rows_over(values))
-    return rows, found[bodies.shaft], found[bodies.housing]
+        values[name] = np.zeros((body.section.mesh.p.shape[1], 4))
+        ring = INNER_RINGS if name.endswith(".inner_ring") else OUTER_RINGS
+        values[name][:, columns.get(name, ring)] = 1.0
+    return seating.thermal_rows(*seating.rows_over(values))
 
 
 def _fit_sigma(diameter: float) -> float:

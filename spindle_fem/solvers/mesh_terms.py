@@ -19,6 +19,8 @@ from scipy import sparse
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.framework.term import COOLANT_INLET, FLOW, FLUID_PREFIX, Term
 from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.machine.view.place_names import GROWTH
+from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.operation.coefficient_table import CoefficientTable, build_coefficient_table, gap_radii_of
 from spindle_fem.operation.effect_terms import (
     Derivatives,
@@ -28,7 +30,7 @@ from spindle_fem.operation.effect_terms import (
     require_known,
 )
 from spindle_fem.operation.loads import LoadChange
-from spindle_fem.operation.named_places import named_places
+from spindle_fem.operation.named_places import growth_places, named_places
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.prepared_machine import PreparedMachine, machine_on_mesh
 
@@ -137,6 +139,9 @@ class FieldTerms:
         """Places of the machine, after a look whether it has all that the terms name."""
         spec = self.machine.spec
         found = dict(named_places(self.machine, self.lumped_names, self._n + len(self.lumped_names)))
+        if any(name.startswith(GROWTH) for name in self.terms.reads):
+            growth = self.machine.growth or GrowthModel(spec, self.machine.mesh, self.machine.operators.order)
+            found |= growth_places(growth, self._n + len(self.lumped_names))
         films = [f"{FLUID_PREFIX}{surface}" for film in spec.film for surface in film.surface]
         require_known(
             self.terms.terms,

@@ -42,9 +42,10 @@ class PreloadResponse:
     outer_ring : float, [m/K]
         How far a kelvin of the outer rings closes the gap.
     housing : mapping of place to float, [m/K]
-        How far a kelvin of each part of the housing opens it.
+        How far a kelvin of the growth of each seat in the housing opens it.
     shaft : mapping of place to float
-        Share of what warm inner rings do that each part of the shaft does, on which they are tight.
+        Share of what warm inner rings do that the growth of each seat on the shaft does, on which they are
+        tight.
     reference_speed : float, [rad/s]
     reference_thrust : float, [N]
     """
@@ -141,14 +142,14 @@ class PreloadResponse:
         return self.friction(difference, gap, speed, thrust) - self.friction(still, cold, speed, thrust)
 
     def spreading(self, inner: NDArray, shaft: NDArray) -> NDArray:
-        """Kelvins of inner rings and shaft alike that do what these (k,) and parts of the shaft (n, k) do."""
+        """Kelvins of inner rings and shaft alike that do what these (k,) and seats on the shaft (n, k) do."""
         shares = np.array(list(self.shaft.values()))
         return (1.0 - shares.sum()) * inner + shares @ shaft
 
     def closing(self, outer: NDArray, housing: NDArray, share: ArrayLike = 1.0) -> NDArray:
-        """Kelvins by which outer rings (k,) close their gap beyond what the housing (n, k) opens it.
+        """Kelvins by which outer rings (k,) close their gap beyond what seats in the housing (n, k) open it.
 
-        ``share`` is how much of its opening by mean temperatures of its parts the housing has.
+        ``share`` is how much of its growth by temperatures and drawing the housing has.
         """
         opening = np.array(list(self.housing.values())) / self.outer_ring
         warmer = outer - self.assembly_temperature

@@ -9,7 +9,15 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
-from spindle_fem.machine.view.place_names import ACROSS, AROUND, NEAR, UP, ringed_probes, sided_names
+from spindle_fem.machine.view.place_names import (
+    ACROSS,
+    AROUND,
+    NEAR,
+    UP,
+    growth_names,
+    ringed_probes,
+    sided_names,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +56,7 @@ class MachineNames:
             *(NEAR + probe.name for probe in spec.probe if probe.kind == "point"),
             *(AROUND + probe.name for probe in ringed_probes(spec)),
             *(prefix + name for name in sided_names(spec) for prefix in (UP, ACROSS)),
+            *(name for pair in growth_names(spec).values() for name in pair),
         ]
         films = tuple(f"film.{surface}" for film in spec.film for surface in film.surface)
         return cls(spec, tuple(places), films, coefficient_groups(spec, contacts))

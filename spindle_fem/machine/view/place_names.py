@@ -1,4 +1,4 @@
-"""Names of places around point probes and of the sides of standing parts, known before there is a mesh."""
+"""Names of places around probes, of sides of standing parts and of seats, known before there is a mesh."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from spindle_fem.definition.machine_spec import MachineSpec, Probe
 NEAR, AROUND = "near.", "around."
 # First harmonics around the axis of a standing place: along y, where a probe's angle is 0, and along -x.
 UP, ACROSS = "up.", "across."
+# Growth of seats of shaft and housing, as temperatures of bodies that are as warm all over.
+GROWTH = "growth."
 # Root mean square distance from the probe, in space, of a patch that no wall cuts, m.
 STANDARD_DISTANCE = 20e-3
 
@@ -33,3 +35,14 @@ def sided_names(spec: MachineSpec) -> tuple[str, ...]:
         if not part.rotating and len(part.segment) > 1
         for segment in part.segment
     )
+
+
+def growth_names(spec: MachineSpec) -> dict[str, tuple[str, str]]:
+    """Places of the seats of every bearing with fits, on shaft and in housing; empty where one is missing."""
+    if {part.rotating for part in spec.part} != {False, True}:
+        return {}
+    return {
+        bearing.name: (f"{GROWTH}{bearing.name}.shaft", f"{GROWTH}{bearing.name}.housing")
+        for group, bearing in spec.bearings
+        if group.fit is not None
+    }

@@ -15,6 +15,7 @@ from spindle_fem.effects.registry import build, effect_of
 from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
 from spindle_fem.machine.view.defined_point import at_the_defined_point
 from spindle_fem.machine.view.machine_names import MachineNames
+from spindle_fem.machine.view.place_names import GROWTH
 from spindle_fem.model.lumped.network_view import day_of_a_network, view_of_network
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.operation.preload_mechanics import machine_view
@@ -276,4 +277,5 @@ def _names_of(machine: PreparedMachine) -> MachineNames:
         node for _, bearing in machine.spec.bearings for node in machine.builder.ball_nodes(bearing.name)
     )
     meshed = {name for name, _ in named_places(machine, balls, machine.operators.n_unknowns + len(balls))}
-    return replace(names, place_names=tuple(name for name in names.place_names if name in meshed))
+    own = (name for name in names.place_names if name in meshed or name.startswith(GROWTH))
+    return replace(names, place_names=tuple(own))

@@ -23,7 +23,7 @@ from spindle_fem.model.mesh.evaluate import probe_matrix
 from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.coefficient_table import gap_radii_of
 from spindle_fem.operation.machine_loads import FieldState
-from spindle_fem.operation.named_places import named_places
+from spindle_fem.operation.named_places import growth_places, named_places
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.probe_places import probe_positions, probe_slopes
 from spindle_fem.solvers.prepared_machine import PreparedMachine
@@ -104,6 +104,7 @@ def build_mesh_model(machine: PreparedMachine) -> MeshModel:
             rows = sparse.vstack([rows, _micrometres(seen, size)], format="csr")
             gradients = sparse.vstack([gradients, sparse.csr_array((2 * len(sensors), size))], format="csr")
             growing["probe_spins"] = MICROMETRES * np.append(np.zeros(len(points)), spins)
+        places |= growth_places(growth, size)
         if growth.bearings:
             own = [growth.bearings.index(bearing.name) for _, bearing in spec.bearings]
             shifts = growth.thermal_rows[own].reshape(4 * len(own), -1)
