@@ -29,8 +29,8 @@ from spindle_fem.solvers.solution_branch import Branch, follow_branch
 
 # Share of the end of a search at which a branch of equilibria begins.
 SLOWEST = 0.05
-# Tolerance of a watt's effect on the machine, in the energy norm; it moves the fold by 3e-5 of its speed.
-RESPONSE_TOLERANCE = 1.0e-3
+# Tolerance of a watt's effect on the machine, in the energy norm; it moves the fold by 3e-4 of its speed.
+RESPONSE_TOLERANCE = 1.0e-2
 RESPONSE_PRECISION = np.float32
 # Difference of two spreads over rings, as a share, that is round-off of that precision.
 SAME_SPREAD = 1.0e-5
