@@ -41,6 +41,9 @@ PRELOAD = 1137.2
 LARGEST = (1.12, 1.9)
 # Share of the friction that follows the load: to begin with, at most; tries to find it.
 SHARE, MOST_SHARE, TRIES = 0.3, 0.85, 8
+# Power of the speed with which friction that does not follow the load rises over that which does: none where
+# contacts rub, 2/3 by Palmgren (viscous moment over that of the load); share at this speed, rpm.
+VISCOUS, AT, SLOWEST = (0.0, 2.0 / 3.0), 3000.0, 0.1
 # Growth of the housing over that of its drawing and temperatures. Under a thin ring (4.4e-12 m/Pa) a seat
 # gives 0.7e-12 m/Pa alone, with its neighbours pressed as well up to 1.4e-12.
 WALL, YIELDING = (0.8, 1.2), (0.12, 0.25)
@@ -82,7 +85,8 @@ sigma = 0.3
 class CoupledPreload(Law):
     """Friction of a set by the ball loads that its own temperatures leave.
 
-    ``share`` of the friction at even temperatures follows the load, with ``power``.
+    ``share`` of the friction at even temperatures and 3000 rpm follows the load, with ``power``; what does
+    not follow it rises with the speed to the power ``viscous`` over what does.
     """
 
     where: str
@@ -91,6 +95,7 @@ class CoupledPreload(Law):
     power: float
     wall: float
     yielding: float
+    viscous: float = 0.0
     _set: BallSet | None = field(default=None, init=False, repr=False)
 
     def start(self, model: ReducedSpindle) -> None:
@@ -114,9 +119,12 @@ class CoupledPreload(Law):
                 still = Warmth(*(np.full(count, ASSEMBLED_AT) for _ in range(4)))
                 even = self.memory[("even", thrust)] = self._set.ball_loads(still, thrust)
             ratio = np.maximum(loads / even, 1e-3)
-            self.memory["factor"] = 1.0 - self.share + self.share * ratio**self.power
-            self.memory["largest"] = max(self.memory.get("largest", 1.0), float(self.memory["factor"].max()))
-        moment.bearing[list(SETS[self.where])] *= self.memory["factor"]
+            self.memory["more"] = ratio**self.power - 1.0
+        rest = (1.0 - self.share) * max(moment.speed / AT, SLOWEST) ** self.viscous
+        factor = 1.0 + self.share / (self.share + rest) * self.memory["more"]
+        if moment.speed > 0.0:
+            self.memory["largest"] = max(self.memory.get("largest", 1.0), float(factor.max()))
+        moment.bearing[list(SETS[self.where])] *= factor
 
     def _warmth(self, moment: Moment) -> Warmth:
         names = [m.BEARINGS[i] for i in SETS[self.where]]
@@ -158,6 +166,7 @@ def draw_coupled(rng: np.random.Generator, model: ReducedSpindle, plan: Plan, bu
         "power": float(rng.uniform(0.4, 0.6)),
         "wall": float(rng.uniform(*WALL)),
         "yielding": float(rng.uniform(*YIELDING)),
+        "viscous": float(rng.uniform(*VISCOUS)),
     }
     wanted = float(np.exp(rng.uniform(*np.log(LARGEST))))
     for _ in range(TRIES):
