@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 FORMAT = "spindle-fem/preload-response/3"
 # K; of rings, at which the shaft's part in what they do is taken.
 REFERENCE_DIFFERENCE = 10.0
+# K; of rings behind the shaft there: rings that differ much more from it would lift off.
+RING_LAG = 1.0
 # K; denser where balls of one side lose their load and where rings meet the housing.
 DIFFERENCES = (-8.0, -3.0, 0.0, 3.0, 7.0, 12.0, 20.0, 30.0, 45.0)
 # m; from a ring that the housing squeezes hard to one that heavy balls hardly spread to it.
@@ -122,7 +124,7 @@ def _solved(spec: MachineSpec, group: BearingSet) -> PreloadResponse:
     seating = RingSeats(spec, bodies)
     names = [bearing.name for bearing in group.bearing]
     rows = _rows(bodies, seating)[[seating.bearings.index(name) for name in names]]
-    turning = rows[:, :, INNER_RINGS] + rows[:, :, SHAFT]
+    rings, shaft = rows[:, :, INNER_RINGS], rows[:, :, SHAFT]
     seats = seating.of_set(names)
     mechanics = BearingMechanics(spec, {group.name: seats})
     level = LEVEL_OF_TABLES if spec.heat.model == "table" else spec.heat.model
@@ -130,7 +132,7 @@ def _solved(spec: MachineSpec, group: BearingSet) -> PreloadResponse:
         mechanics,
         replace(mechanics.options, level=level),
         group,
-        turning,
+        rings + shaft,
     )
     table = spec.heat.table
     highest = max(HIGHEST_SPEED * spec.operation.speed, 0.0 if table is None else table.speed[-1])
@@ -145,10 +147,14 @@ def _solved(spec: MachineSpec, group: BearingSet) -> PreloadResponse:
     ]
     differences, values = _finer(DIFFERENCES, np.moveaxis(np.array(friction), 3, 0), 0)
     gaps, values = _finer(GAPS, values, 1)
-    alone = replace(set_solver, turning=rows[:, :, INNER_RINGS])
     at = (group.fit.outer_clearance / 2.0, spec.operation.speed, loads[len(loads) // 2])
-    of_rings, of_all = (solver.log_ratio(REFERENCE_DIFFERENCE, *at).mean() for solver in (alone, set_solver))
-    by_shaft, count = float(1.0 - of_rings / of_all), len(names)
+    less = REFERENCE_DIFFERENCE - RING_LAG
+    ahead = replace(set_solver, turning=rings + shaft * (REFERENCE_DIFFERENCE / less))
+    both, by_all = (
+        set_solver.log_ratio(difference, *at).mean() for difference in (less, REFERENCE_DIFFERENCE)
+    )
+    by_shaft = float((ahead.log_ratio(less, *at).mean() - both) / (by_all - both))
+    count = len(names)
     seats_on, seats_in = zip(*(growth_names(spec)[name] for name in names), strict=True)
     return PreloadResponse(
         tuple(names),

@@ -32,8 +32,8 @@ LOAD_SHARE_SIGMA = 0.5
 # Largest share: friction that follows its load more than this does not come from rings.
 MOST_LOAD_SHARE = 3.0
 # Standard deviation of the logarithm of the exponent of friction over the ring difference, which depends
-# on the state of the grease (load^(2/3..4/3)): of the power law, of what the mechanics has for one state.
-EXPONENT_SIGMA, STATE_SIGMA = 0.12, 0.2
+# on the state of the grease (load^(0.54..4/3)): of the power law, of what the mechanics has for one state.
+EXPONENT_SIGMA, STATE_SIGMA = 0.12, 0.3
 # Standard deviation of the logarithm of the housing's growth over what elasticity says of its temperatures:
 # expansion of cast iron is known to a twentieth, and a channel's lands and a frame hold it otherwise.
 HOUSING_SIGMA = 0.15
@@ -42,6 +42,14 @@ UNEVENNESS_SIGMA = 0.5
 # In standard deviations of the clearance, from what is ordered: its ends and root mean square. A fit looser
 # than ordered is likelier than a tighter one, as rings are made smaller than their size and bores larger.
 CLEARANCES, CLEARANCE_WIDTH = (-2.0, 4.0), 1.6
+# Standard deviation of the power of the speed by which the share of friction that follows the load falls
+# otherwise than by mechanics: between contacts that rub and Palmgren's viscous moment lie 2/3.
+SPEED_SIGMA = 0.3
+# Of the reference speed; below it that power says nothing more.
+SLOWEST = 0.05
+# In standard deviations of the clearance from what is ordered, where searches begin: rings that meet the
+# housing early, late, and hardly ever explain friction each in a way of its own.
+BEGIN_AT = (0.0, 1.5, 3.0)
 
 
 class ThermalPreloadTerm(Term):
@@ -86,8 +94,9 @@ class PreloadMechanicsTerm(Term):
     difference of the set, and by the gap that outer rings, warmer than the housing, close. The differences
     between the bearings scale with the unevenness: 1 as the mechanics predicts, 0 all equal. ``m₁₀`` is the
     mean increase at 10 K as assembled, so that ``a / m₁₀`` is the share of the friction that follows the
-    load. A set that goes slack loses that share as a power of its friction, which stays above 0. The lag is
-    that of what lies between the places read and the raceways.
+    load at the reference speed; with the speed it falls as the mechanics has it and by a power beside. A set
+    that goes slack loses that share as a power of its friction, which stays above 0. The lag is that of what
+    lies between the places read and the raceways.
     """
 
     n_states = 2
@@ -107,7 +116,8 @@ class PreloadMechanicsTerm(Term):
             linear("unevenness", 1.0, UNEVENNESS_SIGMA, low=0.0, high=1.0 + 2.0 * UNEVENNESS_SIGMA),
             shape("exponent_factor", 1.0, STATE_SIGMA, low=0.5, high=2.0),
             shape("housing_share", 1.0, HOUSING_SIGMA, low=0.2, high=3.0),
-            shape("lag", 200.0, 0.8, "s", low=1.0, high=20000.0),
+            linear("speed_exponent", 0.0, SPEED_SIGMA, low=-1.0, high=1.0),
+            shape("lag", 60.0, 1.0, "s", low=1.0, high=20000.0),
         )
 
     def friction(self, context: TermContext) -> Complex:
@@ -123,8 +133,9 @@ class PreloadMechanicsTerm(Term):
         middle = each.mean(axis=0)
         ratio = np.exp(middle + own["unevenness"] * (each - middle))
         loaded = power((ratio - 1.0) / self.increase, own["exponent_factor"])
-        share = own[NAME] / self.increase
-        return np.where(ratio.real > 1.0, 1.0 + own[NAME] * loaded, ratio**share)
+        turning = np.maximum(np.abs(context.inputs["speed"]) / self.response.reference_speed, SLOWEST)
+        increase = own[NAME] * np.exp(-own["speed_exponent"] * np.log(turning))
+        return np.where(ratio.real > 1.0, 1.0 + increase * loaded, ratio ** (increase / self.increase))
 
     def advance(self, context: TermContext, step: float) -> Complex:
         """Ring difference, inner rings as the shaft spreads them, and closing of the fit, lagged, (2, k)."""
@@ -145,7 +156,7 @@ class ThermalPreload(Effect):
 
     Source: Hertz (1882), load with deflection^1.5; Bossmanns & Tu (1999), Int.
     J. Mach. Tools Manuf. 39, 1345-1366, thermally induced preload in spindles;
-    friction with load^(2/3..4/3), SKF and Palmgren.
+    friction with load^0.54 (rolling) to load^(4/3) (sliding), SKF; load^(2/3..1), Palmgren.
     """
 
     name = "thermal_preload"
@@ -164,8 +175,8 @@ class ThermalPreload(Effect):
             "or, as without fits, × 1 + a (w s₊(x/w) / 10 K)^m"
         ),
         size=(
-            "a ± m₁₀/2, clearance ± 0.5 IT6, unevenness 1 ± 0.5, e 1 ×/÷ e^0.2, "
-            "housing's share 1 ×/÷ e^0.15, τ 200 s ×/÷ e^0.8; "
+            "a ± m₁₀/2, clearance ± 0.5 IT6, unevenness 1 ± 0.5, e 1 ×/÷ e^0.3, "
+            "housing's share 1 ×/÷ e^0.15, power of the speed 0 ± 0.3, τ 60 s ×/÷ e; "
             "without fits a ± 0.25; m 1.45 ×/÷ e^0.12; τ 600 s ×/÷ e^0.4; w 1.5 K ×/÷ e^0.4"
         ),
         acts_on="each bearing set (its bearings share one preload)",
@@ -189,9 +200,13 @@ class ThermalPreload(Effect):
             inner, outer = (tuple(side[b] for b in bearings) for side in (machine.inner, machine.outer))
             terms: dict[str, Term] = {"": ThermalPreloadTerm(self.term_name(group), bearings, inner, outer)}
             response = machine.preload(group)
+            starts: dict[str, list[dict[str, float]]] = {}
             if response is not None:
                 name = self.term_name(group, MECHANICS)
                 terms[MECHANICS] = PreloadMechanicsTerm(name, inner, outer, response)
+                sigma = response.clearance_sigma
+                wider = [response.clearance + side * sigma for side in BEGIN_AT]
+                starts[MECHANICS] = [{"outer_clearance": clearance} for clearance in wider]
             found += [
                 self.candidate(
                     machine.component(group),
@@ -199,6 +214,7 @@ class ThermalPreload(Effect):
                     amplitude=NAME,
                     reference=0.1,
                     form=machine.form(group, form),
+                    starts=starts.get(form, ({},)),
                     constants={}
                     if response is None
                     else {"exponent": response.exponent(REFERENCE_DIFFERENCE)},
