@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from spindle_fem.definition.load import load_machine
+from spindle_fem.report.growth_chart import deformed_section
+from spindle_fem.report.profiles import displacement_section
 from spindle_fem.results.run_summary import build_summary
 from spindle_fem.studies.solve_machine import solve
 
@@ -28,9 +30,28 @@ def test_a_machine_without_a_flange_has_no_nose_but_seats_and_raceways():
     assert found.solid_growth.displacement.shape == found.mesh.points.shape
 
 
+SENSOR = """
+[[displacement_sensor]]
+name = "%s"
+at = {z = "%s mm", radius = "%s mm", angle = "%s deg"}
+direction = "%s"
+mount = %s
+"""
+
+
+def with_sensors(folder):
+    """The reference spindle with sensors on the flange and on spots of the housing."""
+    text = 'schema = "spindle-fem/machine/1"\nbase = "wu_tan_2016"\nname = "seen"\n'
+    text += SENSOR % ("front", 0, 60, 0, "axial", '"flange"')
+    text += SENSOR % ("across", 10, 90, 90, "radial", '{z = "25 mm", radius = "150 mm"}')
+    text += SENSOR % ("below", 0, 60, 180, "axial", '{z = "300 mm", radius = "150 mm"}')
+    (folder / "seen.toml").write_text(text)
+    return folder / "seen.toml"
+
+
 @pytest.mark.slow
-def test_the_nose_moves_as_in_the_meridian_plane_and_the_flange_stays():
-    found = grown("wu_tan_2016")
+def test_the_nose_moves_as_in_the_meridian_plane_and_the_flange_stays(tmp_path):
+    found = grown(with_sensors(tmp_path))
     plane, solid = found.growth, found.solid_growth
     seats_agree(plane, solid)
     assert solid.nose_axial == pytest.approx(plane.nose_axial, rel=0.02)
@@ -41,3 +62,6 @@ def test_the_nose_moves_as_in_the_meridian_plane_and_the_flange_stays():
     told = build_summary(found, 0.0, 0.0)["growth"]
     assert told["three_dimensional"]["nose_axial_um"] == pytest.approx(told["nose_axial_um"], rel=0.02)
     assert set(told["three_dimensional"]["raceways"]) == set(told["raceways"])
+    assert len(found.displacements) == 3
+    assert solid.displacements == pytest.approx(found.displacements, rel=0.01)
+    assert deformed_section(displacement_section(found)) is not None
