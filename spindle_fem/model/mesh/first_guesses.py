@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from spindle_fem.model.mesh.linear_solvers import multiply
+from spindle_fem.model.mesh.threads import combined, dots
 
 # Corrections from which first guesses are combined.
 CORRECTIONS = 8
@@ -38,7 +39,7 @@ class RecentCorrections:
         scaled = correction / np.abs(correction).max()
         self._fields[place] = scaled
         for table, matrix in zip(self._energies, matrices, strict=True):
-            table[place] = table[:, place] = self._fields @ multiply(matrix, scaled)
+            table[place] = table[:, place] = dots(self._fields, multiply(matrix, scaled))
 
     def combine(self, residual: NDArray[np.float64], *factors: float) -> NDArray[np.float64]:
         """Galerkin solution of ``Σ factor · matrix · x = residual`` among the recent corrections."""
@@ -47,4 +48,4 @@ class RecentCorrections:
             return np.zeros_like(residual)
         fields = self._fields[:size]
         projected = np.tensordot(factors, self._energies[:, :size, :size], axes=1)
-        return np.linalg.lstsq(projected, fields @ residual, rcond=1e-9)[0] @ fields
+        return combined(np.linalg.lstsq(projected, dots(fields, residual), rcond=1e-9)[0], fields)

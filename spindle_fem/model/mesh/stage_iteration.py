@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.model.mesh.linear_solvers import largest
+from spindle_fem.model.mesh.threads import combined, dots
 
 Array = NDArray[np.float64]
 
@@ -99,9 +100,9 @@ class StageIteration:
         known = min(self._count, DIFFERENCES)
         if not known:
             return answer
-        along = self._turns[:known] @ (answer - put)
+        along = dots(self._turns[:known], answer - put)
         weights = np.linalg.lstsq(self._gram[:known, :known], along, rcond=INDEPENDENT)[0]
-        return answer - weights @ self._changes[:known]
+        return answer - combined(weights, self._changes[:known])
 
     def _add(self, put: Array, answer: Array) -> None:
         """Keep the differences of two answers and of their distances, to one length; the oldest goes."""
@@ -114,4 +115,4 @@ class StageIteration:
         place = self._count % DIFFERENCES
         self._count += 1
         self._changes[place], self._turns[place] = answer / length, turn / length
-        self._gram[place] = self._gram[:, place] = self._turns @ self._turns[place]
+        self._gram[place] = self._gram[:, place] = dots(self._turns, self._turns[place])

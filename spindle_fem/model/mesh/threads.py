@@ -59,6 +59,27 @@ def run_blocks(function: Callable, bounds: NDArray[np.int64], *arguments: object
     return in_threads([partial(function, low, high, *arguments) for low, high in itertools.pairwise(bounds)])
 
 
+def dots(rows: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Scalar products of each row (k, n) with a vector (n,), whose digits no number of threads changes."""
+    return sum(run_blocks(lambda low, high: rows[:, low:high] @ vector[low:high], _pieces(len(vector))))
+
+
+def combined(weights: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sum of rows (k, n) times weights (k,), (n,)."""
+    answer = np.empty(rows.shape[1])
+
+    def fill(low: int, high: int) -> None:
+        np.dot(weights, rows[:, low:high], out=answer[low:high])
+
+    run_blocks(fill, _pieces(len(answer)))
+    return answer
+
+
+def _pieces(size: int) -> NDArray[np.int64]:
+    """Bounds of pieces of a vector that do not depend on the number of threads."""
+    return np.linspace(0, size, max(1, size // LEAST_ROWS) + 1).astype(np.int64)
+
+
 def fill_rows(
     function: Callable,
     n_rows: int,

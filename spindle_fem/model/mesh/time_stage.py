@@ -11,16 +11,19 @@ from scipy import sparse
 
 from spindle_fem.errors import ConvergenceError, SpecError
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, reference_temperature
-from spindle_fem.model.mesh.equations import assemble_capacity, assemble_load, assemble_system
+from spindle_fem.model.mesh.equations import assemble_capacity, assemble_load
 from spindle_fem.model.mesh.first_guesses import RecentCorrections
 from spindle_fem.model.mesh.heat_balance import BoundaryFlows, boundary_flows
+from spindle_fem.model.mesh.huge_pages import room
 from spindle_fem.model.mesh.linear_solvers import Preconditioner, build_preconditioner, multiply, solve_linear
 from spindle_fem.model.mesh.linear_system import ThermalSystem, merged
+from spindle_fem.model.mesh.renewed_equations import Equations, RenewedEquations
 from spindle_fem.model.mesh.stage_iteration import UNKNOWN_CONTRACTION, StageIteration
 from spindle_fem.model.mesh.steady_conduction import close_balance, split_unknowns
 from spindle_fem.model.mesh.step_control import LEAST_SHARE, StepControl
 from spindle_fem.model.mesh.temperature_films import linearise_films
 from spindle_fem.model.mesh.thermal_state import ThermalState
+from spindle_fem.model.mesh.threads import row_blocks, run_blocks
 from spindle_fem.model.trbdf2 import (
     DIAGONAL,
     GAMMA,
@@ -70,7 +73,6 @@ class _Kept:
     """Data of the last solve, reused by the next."""
 
     coefficients: ConductionProblem | None = None
-    system: ThermalSystem | None = None
     tied: ThermalSystem | None = None
     conduction: sparse.csr_array | None = None
     step: float = -1.0
@@ -113,12 +115,13 @@ class StageSolver:
         storage, lumped_capacity = assemble_capacity(problem)
         self._lumped_capacity = lumped_capacity
         self._content = np.concatenate((storage @ np.ones(storage.shape[0]), lumped_capacity))
-        system = assemble_system(self._linear(problem, start.temperature))
-        self._tie = system.tie
+        self._renewed = RenewedEquations()
+        own = self._renewed.of(self._linear(problem, start.temperature))
+        self._tie = own.system.tie
         self._tied_storage = storage if self._tie is None else merged(storage, self._tie)
         self._n = self._tied_storage.shape[0]
-        self._storage = system.tied().beside_full(self._tied_storage, np.diag(lumped_capacity))
-        self._kept = _Kept()
+        self._storage = self._beside(own)
+        self._kept = _Kept(conduction=own.matrix)
         self._recent = RecentCorrections(2)
         self._origin = (start.time, 1.0)
         self._shift = 0.0
@@ -328,13 +331,21 @@ class StageSolver:
     def _system(self, problem: ConductionProblem) -> ThermalSystem:
         kept = self._kept
         if kept.coefficients is None or not same_coefficients(problem, kept.coefficients):
-            kept.system = assemble_system(problem, self._reference)
-            kept.tied = kept.system.tied()
-            kept.conduction = kept.tied.full_matrix()
-            self._storage = kept.tied.beside_full(self._tied_storage, np.diag(self._lumped_capacity))
+            own = self._renewed.of(problem)
+            kept.tied = own.tied
+            if own.matrix is not kept.conduction:
+                kept.conduction, self._storage = own.matrix, self._beside(own)
             kept.coefficients = problem
             kept.matrix = None
         return kept.tied
+
+    def _beside(self, equations: Equations) -> sparse.csr_array:
+        """Storage on the pattern of the equations, the indices of both the same memory."""
+        storage = equations.tied.beside_full(self._tied_storage, np.diag(self._lumped_capacity))
+        other = equations.matrix
+        if not _one_pattern(storage, other):
+            return storage
+        return sparse.csr_array((storage.data, other.indices, other.indptr), shape=storage.shape)
 
     def _matrix(self, size: float) -> sparse.csr_array:
         kept = self._kept
@@ -385,7 +396,14 @@ class StageSolver:
 def add_scaled(one: sparse.csr_array, factor: float, other: sparse.csr_array) -> sparse.csr_array:
     """``one + factor · other``; on one pattern only the entries are added."""
     if _one_pattern(one, other):
-        return sparse.csr_array((one.data + factor * other.data, one.indices, one.indptr), shape=one.shape)
+        data = room(one.nnz)
+
+        def fill(low: int, high: int) -> None:
+            np.multiply(other.data[low:high], factor, out=data[low:high])
+            data[low:high] += one.data[low:high]
+
+        run_blocks(fill, row_blocks(len(data)))
+        return sparse.csr_array((data, one.indices, one.indptr), shape=one.shape)
     return sparse.csr_array(one + factor * other)
 
 
