@@ -155,6 +155,8 @@ def _serve(make: Callable[[], Any], connection: Any, other_end: Any) -> None:
         threading.Thread(target=read, daemon=True).start()
         made = None
         with threadpool_limits(1):
+            with contextlib.suppress(Exception):  # tried again by the first call, which raises it
+                made = make()
             while (call := asked.get()) is not None:
                 method, arguments = call
                 try:

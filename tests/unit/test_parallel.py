@@ -173,6 +173,21 @@ def test_a_background_process_answers_in_order():
         assert (first()[1] != os.getpid()) == SEVERAL_CORES
 
 
+@pytest.mark.skipif(not SEVERAL_CORES, reason="works in this process on one core")
+def test_the_object_is_made_before_it_is_asked_anything(tmp_path):
+    with BackgroundProcess(partial(Path.touch, tmp_path / "made")):
+        for _ in range(100):
+            if (tmp_path / "made").exists():
+                break
+            threading.Event().wait(0.1)
+        assert (tmp_path / "made").exists()
+
+
+def test_an_object_that_cannot_be_made_is_an_error_of_the_first_call():
+    with BackgroundProcess(Counter().fail) as process, pytest.raises(BadInputError, match="cannot do it"):
+        process.ask("add", 1)()
+
+
 def test_what_may_not_be_beside_works_here():
     with BackgroundProcess(Counter, beside=False) as process:
         first, second = process.ask("add", 1), process.ask("add", 2)

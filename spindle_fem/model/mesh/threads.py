@@ -75,6 +75,23 @@ def combined(weights: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray
     return answer
 
 
+def product(rows: NDArray, columns: NDArray) -> NDArray:
+    """``A C`` of tall rows (n, k) and a small matrix (k, m) of one precision."""
+    answer = np.empty((len(rows), columns.shape[1]), dtype=rows.dtype)
+
+    def fill(low: int, high: int) -> None:
+        np.matmul(rows[low:high], columns, out=answer[low:high])
+
+    run_blocks(fill, _pieces(len(rows)))
+    return answer
+
+
+def inner_product(rows: NDArray, others: NDArray) -> NDArray[np.float64]:
+    """``Aᵀ B`` of two tall matrices (n, k) and (n, m), pieces of them added in double precision."""
+    bounds = _pieces(len(rows))
+    return sum(run_blocks(lambda low, high: (rows[low:high].T @ others[low:high]).astype(float), bounds))
+
+
 def _pieces(size: int) -> NDArray[np.int64]:
     """Bounds of pieces of a vector that do not depend on the number of threads."""
     return np.linspace(0, size, max(1, size // LEAST_ROWS) + 1).astype(np.int64)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +22,11 @@ from spindle_fem.model.matrices_on_pattern import sum_of
 from spindle_fem.model.mesh.column_solver import COLUMNS_AT_ONCE, corrections, dots, product_of
 from spindle_fem.model.mesh.huge_pages import room
 from spindle_fem.model.mesh.linear_solvers import Preconditioner, build_preconditioner
+from spindle_fem.model.mesh.threads import LEAST_ROWS, inner_product, product, run_blocks
 from spindle_fem.model.reduced.mesh_model import MeshModel
 from spindle_fem.model.reduced.snapshots import Sample
 from spindle_fem.model.thermal_model import MATRIX_FIELDS, ThermalModel
+from spindle_fem.parallel import in_threads
 
 Array = NDArray[np.float64]
 
@@ -57,7 +60,7 @@ class _Block:
         own = np.ascontiguousarray(fresh[self.rows])
         image = np.empty_like(own)
         product_of(self.matrix)(own, image)
-        return directions[self.rows].T @ image
+        return inner_product(directions[self.rows], image)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +148,7 @@ class GrowingProjection:
 
     def fields(self, coordinates: Array) -> NDArray[np.float32]:
         """Temperatures of coordinates (d', m) on the first d' directions, (n, m) [K]."""
-        return self._directions[:, : len(coordinates)] @ coordinates.astype(PRECISION)
+        return product(self._directions[:, : len(coordinates)], coordinates.astype(PRECISION))
 
     def _prepare_to_grow(self) -> None:
         """Matrix of the energy, and every operator on its own rows: a basis that is enough needs neither."""
@@ -166,14 +169,16 @@ class GrowingProjection:
         self._prepare_to_grow()
         image = np.empty_like(block)
         product_of(self._energy)(block, image)
-        known = (self.directions.T @ image).astype(float)
+        known = inner_product(self.directions, image)
         held = np.linalg.solve(self._weighted(self.sample, CAPACITY_SHARE), known)
         new = _gram(block, image) - known.T @ held
         values, vectors = eigh(0.5 * (new + new.T))
         chosen = values > max(smallest**2, DEPENDENT_SHARE * float(values.max(initial=0.0)))
         turn = vectors[:, chosen] / np.sqrt(values[chosen])
         # New part of each, orthonormal among themselves and to those before.
-        self._join(block @ turn.astype(PRECISION) - self.fields(held @ turn))
+        fresh = product(block, turn.astype(PRECISION))
+        fresh -= self.fields(held @ turn)
+        self._join(fresh)
         coordinates = np.zeros((self.size, block.shape[1]))
         coordinates[: len(held)], coordinates[len(held) :] = held, turn.T @ new
         return coordinates
@@ -189,8 +194,12 @@ class GrowingProjection:
         for name, blocks in self._blocks.items():
             grown = np.zeros((len(blocks), joined, joined))
             grown[:, :old, :old] = self._stacks[name]
+            # large ones share threads themselves, and two of them would take the memory of two
+            small = [own for own in blocks if own.matrix.shape[0] < LEAST_ROWS]
+            jobs = [partial(own.projected, self.directions, fresh) for own in small]
+            done = dict(zip(map(id, small), in_threads(jobs), strict=True))
             for stack, own in zip(grown, blocks, strict=True):
-                borders = own.projected(self.directions, fresh)
+                borders = done[id(own)] if id(own) in done else own.projected(self.directions, fresh)
                 stack[:, old:], stack[old:, :old] = borders, borders[:old].T
                 stack[old:, old:] = 0.5 * (stack[old:, old:] + stack[old:, old:].T)
             self._stacks[name] = grown
@@ -238,7 +247,7 @@ class GrowingProjection:
             turns.append(vectors[:, chosen])
             turn = turns[-1].astype(PRECISION)
             target = np.minimum(wanted**2, LEAST_REDUCTION**2 * values[chosen])
-            missing.append(_Missing(residual @ turn, conditioned @ turn, target))
+            missing.append(_Missing(product(residual, turn), product(conditioned, turn), target))
         if any(turn.size for turn in turns):
             added = self.add(np.hstack(self._corrected(system, missing, shifts)), DISTINCT_SHARE * wanted)
             parts = np.split(added, np.cumsum([turn.shape[1] for turn in turns])[:-1], axis=1)
@@ -287,7 +296,7 @@ class GrowingProjection:
         """Galerkin solutions of every frequency, and what they leave of the loads."""
         conduction = self._weighted(system.sample, 0.0)
         capacity = self._weighted(system.sample, 1.0) - conduction
-        entering = (self.directions.T @ loads.astype(PRECISION)).astype(float)
+        entering = inner_product(self.directions, loads.astype(PRECISION))
         if basis is not None:
             # Directions may have joined since.
             k = len(basis)
@@ -379,8 +388,7 @@ def _in_portions(apply: Callable[[NDArray], NDArray], columns: NDArray) -> NDArr
 
 def _gram(one: NDArray, two: NDArray) -> Array:
     """Scalar products of all columns of two single-precision blocks, (m, m), in double precision."""
-    total = np.zeros((one.shape[1], two.shape[1]))
-    for first in range(0, len(one), ROWS_AT_ONCE):
-        own = slice(first, first + ROWS_AT_ONCE)
-        total += one[own].astype(float).T @ two[own].astype(float)
-    return total
+    bounds = np.append(np.arange(0, len(one), ROWS_AT_ONCE), len(one))
+    return sum(
+        run_blocks(lambda low, high: one[low:high].astype(float).T @ two[low:high].astype(float), bounds)
+    )
