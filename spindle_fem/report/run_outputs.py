@@ -270,6 +270,10 @@ class _ChartWorker:
         import jinja2  # noqa: F401
         import xarray  # noqa: F401
 
+        import spindle_fem.report.growth_chart
+        import spindle_fem.report.machine_drawing
+        import spindle_fem.report.run_report  # noqa: F401
+
         self._folder = Path()
         self._result: ThermalResult | None = None
         self._definition: Image | None = None
