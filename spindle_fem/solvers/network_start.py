@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 INITIAL_KINDS = ("first_reading", "ambient", "steady")
 # K; standard deviation of a node that nothing reads, about its estimate.
 UNREAD_SIGMA = 5.0
+# 1 σ of what a thermocouple or a resistance sensor reads beside the truth, K (IEC 60584 and 60751): a node
+# may begin that far from its first reading, which is fitted like all others.
+READ_SIGMA = 1.5
 
 
 def require_compatible(network: ThermalNetwork, recording: Recording) -> tuple[str, ...]:
@@ -246,7 +249,8 @@ def initial_parameters(network: ThermalNetwork, recording: Recording) -> tuple[P
             kind="initial",
             index=index,
             value=float(state[index]),
-            sigma_log=(sigma[name] if name in readings else UNREAD_SIGMA) / float(state[index]),
+            sigma_log=(np.hypot(sigma[name], READ_SIGMA) if name in readings else UNREAD_SIGMA)
+            / float(state[index]),
             unit="K",
         )
         for index, name in enumerate(network.node_names)

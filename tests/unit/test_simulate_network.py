@@ -17,7 +17,7 @@ from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.compare import compare, simulation_summary, write_simulated
 from spindle_fem.recordings.conditions import operating_conditions
 from spindle_fem.recordings.input_samples import InputHistory
-from spindle_fem.solvers.network_start import initial_parameters, initial_state, magnitude_history
+from spindle_fem.solvers.network_start import READ_SIGMA, initial_parameters, initial_state, magnitude_history
 from tests.support.network_runs import modal_solution, run_on_recording
 from tests.support.written_texts import network_text
 
@@ -138,8 +138,9 @@ def test_initial_parameters_move_the_first_segment_only(tmp_path, network):
     recording = make(tmp_path, network, times=times)
     start = initial_parameters(network, recording)
     assert [item.name for item in start] == ["initial.bearing", "initial.shaft", "initial.housing"]
-    # 0.1 K of noise on what is read, 5 K on the estimate of what is not
-    assert [item.sigma_log * item.value for item in start] == pytest.approx([0.1, 5.0, 0.1])
+    # noise of 0.1 K and what sensors err by on what is read, 5 K on the estimate of what is not
+    read = float(np.hypot(0.1, READ_SIGMA))
+    assert [item.sigma_log * item.value for item in start] == pytest.approx([read, 5.0, read])
     moved = tuple(replace(item, value=item.value + 10.0) for item in start)
     result = run_on_recording(network, recording, parameters=moved)
     assert_allclose(result.predicted[0], recording.temperature[0] + 10.0, atol=1e-9)
