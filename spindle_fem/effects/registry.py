@@ -172,8 +172,9 @@ def _of_any_recording(view: MachineView) -> MachineView:
 
 def _require_possible(item: TermParameter, value: float, is_amplitude: bool, where: str) -> None:
     """Refuse a wrong sign, and a pure amplitude beyond its limits; other limits are those of a search."""
-    low = item.low if item.low == 0.0 or (is_amplitude and not item.unit) else -np.inf
-    high = item.high if is_amplitude and not item.unit else np.inf
+    pure = is_amplitude and not item.unit
+    low = item.low if pure else 0.0 if item.low >= 0.0 else -np.inf
+    high = item.high if pure else np.inf
     if not low <= value <= high:
         allowed = f"{low:g} to {high:g}" if np.isfinite(high) else f"{low:g} or more"
         raise SpecError(

@@ -40,17 +40,19 @@ class StarvationTerm(Term):
     ----------
     speed : str
         Input.
-    highest : float, [rad/s]
-        Of it, for the prior of the onset.
+    highest, lowest : float, [rad/s]
+        Of it, for the prior of the onset. One below nearly all speeds would be a factor on all friction.
     """
 
     n_states = 1
 
-    def __init__(self, name: str, bearings: tuple[str, ...], speed: str, highest: float) -> None:
+    def __init__(
+        self, name: str, bearings: tuple[str, ...], speed: str, highest: float, lowest: float = 0.0
+    ) -> None:
         self.name, self.bearings, self._speed = name, bearings, speed
         self.parameters = (
             amplitude("friction_change", 0.4, low=-0.9, high=5.0),
-            linear("onset_speed", 0.6 * highest, 0.3 * highest, "rad/s", low=0.0, high=1.3 * highest),
+            linear("onset_speed", 0.6 * highest, 0.3 * highest, "rad/s", low=lowest, high=1.3 * highest),
             shape("width", 120.0 * RPM, 0.7, "rad/s", low=5.0 * RPM, high=1500.0 * RPM),
             linear("growth_per_1000rpm", *GROWTH, low=-0.5, high=5.0),
             shape("lag", 100.0, 1.0, "s", low=1.0, high=5000.0),
@@ -89,8 +91,8 @@ class Starvation(Effect):
         group="Bearings",
         law="friction × 1 + a s, s follows S((n - n₀)/w)·(1 + g (n - n₀)₊) with a lag",
         size=(
-            "a ± 0.4 (above -0.9); n₀ 0.6 ± 0.3 of the highest speed, searched; w 120 rpm ×/÷ e^0.7; g 0 "
-            "± 0.2 per 1000 rpm; lag 100 s ×/÷ e"
+            "a ± 0.4 (above -0.9); n₀ 0.6 ± 0.3 of the highest speed, above the slowest tenth; w 120 rpm "
+            "×/÷ e^0.7; g 0 ± 0.2 per 1000 rpm; lag 100 s ×/÷ e"
         ),
         acts_on="set, bearing, source with a speed",
         source="Cann et al. (2004), Tribol. Int. 37, 859",
@@ -107,7 +109,7 @@ class Starvation(Effect):
             for speed in machine.speeds(key)[:1]:
                 highest = machine.highest(speed) or USUAL_SPEED
                 lowest = min(max(machine.lowest_speed, 0.15 * highest), 0.8 * highest)
-                term = StarvationTerm(self.term_name(key), bearings, speed, highest)
+                term = StarvationTerm(self.term_name(key), bearings, speed, highest, lowest)
                 onsets = np.linspace(lowest, highest, ONSETS + 1)
                 starts = [{"onset_speed": float(n)} for n in 0.5 * (onsets[1:] + onsets[:-1])]
                 found.append(

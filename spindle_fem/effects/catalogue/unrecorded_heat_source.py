@@ -38,7 +38,10 @@ class UnrecordedHeatSource(UnrecordedEffect):
             "heat u(t - b) - u(t - e) with first-order edges in intervals, or heat with a power m of a "
             "recorded quantity above an onset q₁"
         ),
-        size="heat ± 0.2 Q; τ 200 s ×/÷ e^0.7; edges ± 300 s; m 1 ± 0.3; q₁ 0 + 0.3 of the largest q",
+        size=(
+            "heat ± 0.2 Q; τ 200 s ×/÷ e^0.7, behind a quantity e^1.2; edges ± 300 s; m 1 ± 0.3; q₁ 0 + 0.3 "
+            "of the largest q"
+        ),
         acts_on="every place heat may come from",
         states={"heat": "W"},
         makes=Makes("warmer", probe="SP04", at="housing"),

@@ -42,6 +42,8 @@ TOUCHING = 1e-6
 # Widths or lags after which an edge is over.
 FAR = 40.0
 FOLLOWING, ONSET = "following", "onset"
+# 1 σ of the logarithm of the lag behind a followed quantity: a lip warms in seconds, a gearbox in an hour.
+LAG_SIGMA = 1.2
 # Onset of a followed law at most, as a share of the largest value that was recorded, and that from which a
 # search begins too; one less than the least share is none in words.
 HIGHEST_ONSET, BEGUN_ONSET, LEAST_ONSET = 0.95, 0.5, 0.05
@@ -75,8 +77,8 @@ class Share(Protocol):
         """State after a step, (n_states, k)."""
 
 
-def _lag() -> TermParameter:
-    return shape("lag", 200.0, 0.7, "s", low=2.0, high=7200.0)
+def _lag(sigma: float = 0.7) -> TermParameter:
+    return shape("lag", 200.0, sigma, "s", low=2.0, high=7200.0)
 
 
 class InIntervals:
@@ -213,7 +215,7 @@ class Followed:
             linear("exponent", 1.0, 0.3, low=0.2, high=4.0),
             linear(ONSET, 0.0, 0.3 * highest, quantity.unit, low=0.0, high=HIGHEST_ONSET * highest),
         )
-        self.parameters = (_lag(), *(() if quantity.changes else law), reference)
+        self.parameters = (_lag(LAG_SIGMA), *(() if quantity.changes else law), reference)
 
     def _target(self, context: TermContext) -> Complex:
         quantity, own = np.abs(context.inputs[self.follows[0]]), context.parameters

@@ -20,6 +20,8 @@ LEAST_RISE = 2.0
 LEAST_HEAT = 1.0
 # A quantity is on above this share of its largest value; number of quantiles that represent its levels.
 LEAST_ON, QUANTILES = 0.05, 32
+# Share of the time that a machine turns for which it is slow.
+LOW = 0.1
 # Units that have a name, by what they come out as from SI base units.
 NAMED = {"kg*m/s**2": "N", "kg*m**2/s**3": "W"}
 
@@ -32,9 +34,13 @@ def input_series(recording: Recording, name: str, otherwise: float) -> Array:
 
 
 def lowest_speed(speed: Array) -> float:
-    """Lowest speed above standstill."""
+    """Speed that is not exceeded for a tenth of the rows above standstill.
+
+    >>> lowest_speed(np.array([0.0, 0.0, 1.0, *[100.0] * 20, 300.0]))
+    100.0
+    """
     turning = speed[speed > 1e-3 * max(float(speed.max()), 1e-12)]
-    return float(turning.min()) if turning.size else 0.0
+    return float(np.quantile(turning, LOW)) if turning.size else 0.0
 
 
 def usual_rise(recording: Recording, ambient: Array) -> float:
