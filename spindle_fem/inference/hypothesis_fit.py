@@ -36,6 +36,8 @@ NOT_SIMULATED = (ConvergenceError, OutOfValidityError, SpecError)
 MOST_ITERATIONS = 30
 # An exact fit ends with a step that lowers the misfit by less than this share: rounding comes next.
 EXACT_SHARE = 1.0e-8
+# Share of the promised decrease from which the straight problem is trusted for longer steps.
+FAIR_STEP = 0.3
 # Largest change of any coordinate in one step, in prior deviations.
 LARGEST_MOVE = 2.0
 
@@ -273,6 +275,9 @@ class Problem:
         damping = 1e-3
         for iteration in range(iterations):
             hessian, gradient = slopes.curvature(point), slopes.downhill(point)
+            enough = EXACT_SHARE * point.cost
+            if not exact:
+                enough = tuned.SMALLEST_DECREASE + tuned.SMALLEST_DECREASE_SHARE * point.cost
             if iteration and np.isfinite(hopeless):
                 whole = _bounded_step(hessian, gradient, 0.0, point.position, low, high)
                 promised = float(2.0 * gradient @ whole - whole @ hessian @ whole)
@@ -290,6 +295,9 @@ class Problem:
                 ):
                     damping *= 10.0
                     continue
+                promised = float(2.0 * gradient @ move - move @ hessian @ move)
+                if 0.0 <= promised < enough:
+                    break
                 try:
                     trial = objective.at(point.position + move, slopes.predicted_after(move))
                 except NOT_SIMULATED:
@@ -298,7 +306,8 @@ class Problem:
                 if trial is not None and trial.cost < point.cost - 1e-9:
                     gain = point.cost - trial.cost
                     point = trial
-                    damping = max(damping / 10.0, 1e-6)
+                    # Where the straight problem promised far more, the next step is no longer than this one.
+                    damping = max(damping * (0.1 if gain > FAIR_STEP * promised else 3.0), 1e-6)
                     break
                 if largest < 1e-6:
                     break
@@ -306,11 +315,7 @@ class Problem:
                 damping *= 10.0
             # A step that was taken gains more than nothing. The last one gains so little that the derivatives
             # before it serve.
-            if gain == 0.0 or gain < (
-                EXACT_SHARE * point.cost
-                if exact
-                else tuned.SMALLEST_DECREASE + tuned.SMALLEST_DECREASE_SHARE * point.cost
-            ):
+            if gain < enough:
                 break
             if iteration >= tuned.HOPELESS_AFTER and point.cost - tuned.HOPELESS_REACH * gain > hopeless:
                 break

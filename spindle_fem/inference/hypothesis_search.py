@@ -22,6 +22,7 @@ from spindle_fem.inference.candidate_response import Variant, variants_of
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis, identity
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.linearised_fit import LinearProblem
 from spindle_fem.inference.missing_heat import (
     OnOff,
     Onsets,
@@ -120,10 +121,17 @@ class Search:
             tasks.append(self.task(fit, additions, intervals))
         self.fit_all(tasks)
 
-    def screened(self, fit: Fit, trust: Fit | None = None) -> tuple[Screened, dict[int, OnOff]]:
+    def screened(
+        self, fit: Fit, trust: Fit | None = None, *, only_laws: bool = False
+    ) -> tuple[Screened, dict[int, OnOff]]:
         """Candidates, and intervals at every spot, against what a fit leaves.
 
-        ``trust`` is the fit that gains count from where that is another one.
+        Parameters
+        ----------
+        trust : Fit or None
+            The fit that gains count from where that is another one.
+        only_laws : bool
+            Whether to leave intervals out, which take most of the time.
         """
         families = self._families()
         present = {(effect, families.get(component, component)) for effect, component in fit.keys}
@@ -134,13 +142,16 @@ class Search:
         variants = variants_of(
             [replace(c, starts=self.effects[c.effect].starts_from(c, times, residual)) for c in allowed]
         )
-        intervals = {}
-        if not any(self.in_intervals(c) for c in fit.candidates):
-            for found, candidate in self.interval_candidates(fit, trust):
+        intervals, linear = {}, None
+        if not (only_laws or any(self.in_intervals(c) for c in fit.candidates)):
+            linear = LinearProblem.about(self.problem, fit, trust)
+            for found, candidate in self.interval_candidates(fit, linear):
                 variant = Variant(candidate, {})
                 intervals[id(candidate)] = found
                 variants.append(variant)
-        found = screen(self.problem, fit, variants, self.weights, families, trust, self.workers)
+        found = screen(
+            self.problem, fit, variants, self.weights, families, trust, self.workers, linear=linear
+        )
         if trust is None:
             self.screenings[identity(fit.candidates)] = found
         return found, intervals
@@ -155,10 +166,12 @@ class Search:
         known = recording.usable & predictor.use[0][:, None]
         return recording.times, np.where(known, recording.temperature - at_stamps, np.nan)
 
-    def interval_candidates(self, fit: Fit, trust: Fit | None) -> Iterable[tuple[OnOff, Candidate]]:
+    def interval_candidates(
+        self, fit: Fit, linear: LinearProblem | None = None
+    ) -> Iterable[tuple[OnOff, Candidate]]:
         """Unrecorded heat or loss in intervals that explains what a fit leaves, the best spots first.
 
-        ``trust`` as :meth:`screened` takes it.
+        ``linear`` is the problem about the fit, where that is known.
         """
         patterns = self.patterns()
         found: list[tuple[IntervalEffect, OnOff]] = []
@@ -169,7 +182,7 @@ class Search:
                 [pattern for _, pattern in patterns],
                 recording,
                 number=tuned.ONSETS_OF_NETWORK if self.problem.predictor.is_network else tuned.ONSETS,
-                trust=trust,
+                linear=linear,
                 workers=self.workers,
             )
             stop = float(self.problem.predictor.drives[recording].grid[-1])
@@ -261,7 +274,9 @@ class Search:
                 self.remember_cost(variant.candidate, intervals_cost(intervals[id(variant.candidate)]))
         return candidates, start
 
-    def fit_all(self, tasks: Sequence[Task], again: bool = False) -> None:
+    def fit_all(
+        self, tasks: Sequence[Task], again: bool = False, reach: float = tuned.HOPELESS_SCORE
+    ) -> None:
         """Fit the sets that are not known yet, some at a time side by side, and keep them.
 
         The same number at a time whatever the number of workers, so that the result is the same.
@@ -270,6 +285,8 @@ class Search:
         ----------
         again : bool
             Whether to fit known sets again that begin with less misfit than they ended with.
+        reach : float
+            Deficit in log probability from which a set does not matter.
         """
         waiting: dict[frozenset, Task] = {}
         for candidates, start in tasks:
@@ -281,7 +298,7 @@ class Search:
         rest = range(FITTED_FIRST, len(queue), FITTED_TOGETHER)
         for together in (queue[:FITTED_FIRST], *(queue[first : first + FITTED_TOGETHER] for first in rest)):
             orders = [
-                FitOrder(candidates, start, tuned.START_SHARES, self._hopeless(len(candidates)))
+                FitOrder(candidates, start, tuned.START_SHARES, self._hopeless(len(candidates), reach))
                 for candidates, start in together
             ]
             for (candidates, _), fitted in zip(
@@ -316,16 +333,16 @@ class Search:
         gaps = self.problem.predictor.gap_intervals(recording)
         return sum(max(0.0, min(span[1], stop) - max(span[0], begin)) for begin, stop in gaps)
 
-    def _hopeless(self, size: int) -> float:
+    def _hopeless(self, size: int, reach: float) -> float:
         """Misfit beyond which a set of some size does not matter."""
-        return self.ranked()[0].fit.misfit_with_prior + 2.0 * self.reach(size)
+        return self.ranked()[0].fit.misfit_with_prior + 2.0 * self.reach(size, reach)
 
-    def reach(self, size: int) -> float:
+    def reach(self, size: int, least: float = tuned.HOPELESS_SCORE) -> float:
         """Largest deficit in log probability at which a set may still matter."""
         if size > 1:
-            return tuned.HOPELESS_SCORE
+            return least
         gain = self.ranked()[0].score - self.found[identity(())].score
-        return max(tuned.HOPELESS_SCORE, (1.0 - tuned.FAIR_SHARE) * gain)
+        return max(least, (1.0 - tuned.FAIR_SHARE) * gain)
 
     def keep(self, hypothesis: Hypothesis) -> None:
         """Add a fitted hypothesis to those found, unless it is on only where nothing was recorded."""

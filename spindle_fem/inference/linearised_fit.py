@@ -76,7 +76,9 @@ class Box:
         return bool(np.any((free < self.low - NEAR) | (free > self.high + NEAR)))
 
 
-def bounded_minimum(hessian: Array, downhill: Array, low: Array, high: Array) -> Array:
+def bounded_minimum(
+    hessian: Array, downhill: Array, low: Array, high: Array, begin: NDArray[np.int64] | None = None
+) -> Array:
     """Minimum of ``x H x / 2 - g x`` between bounds, (n,).
 
     All coordinates that violate a bound, or are held at one that they would leave, change sides at once;
@@ -88,6 +90,8 @@ def bounded_minimum(hessian: Array, downhill: Array, low: Array, high: Array) ->
         Positive definite.
     downhill, low, high : (n,) ndarray
         Bounds may be infinite or equal.
+    begin : (n,) ndarray, optional
+        Coordinates that may be held: -1 at the lower bound, 1 at the upper one, 0 free. All free by default.
 
     Raises
     ------
@@ -100,7 +104,8 @@ def bounded_minimum(hessian: Array, downhill: Array, low: Array, high: Array) ->
     >>> bounded_minimum(hessian, downhill, np.zeros(2), np.array([0.5, 9.0]))
     array([0.5 , 1.25])
     """
-    side, steepness = np.zeros(len(downhill), dtype=int), np.diag(hessian)
+    side = np.zeros(len(downhill), dtype=int) if begin is None else begin.copy()
+    steepness = np.diag(hessian)
     fewest, patience = len(downhill) + 1, PATIENCE
     found = np.empty(len(downhill))
     for _ in range(MOST_ROUNDS * len(downhill)):
@@ -134,15 +139,48 @@ class BoxedColumns:
     with_columns: Array
     with_residual: Array
 
-    def cost(self, members: Sequence[int], spread: Array, one_sided: Array) -> float:
-        """Least of the quadratic form with the columns of some members, amplitudes included.
+    def costs(self, sets: NDArray[np.int64], spread: Array, one_sided: Array) -> Array:
+        """Least of the quadratic form with the columns of each of several sets, amplitudes included, (k,).
+
+        With the coordinates held that bounds hold without any column, all sets are solved at once; those
+        that move others to or from their bounds are then solved one by one.
 
         Parameters
         ----------
+        sets : (k, s) ndarray
         spread : (m,) ndarray
             Prior standard deviation of every amplitude.
         one_sided : (m,) ndarray of bool
             Amplitudes that cannot be negative.
+        """
+        held = HeldColumns.of(self)
+        matrix = held.with_columns[sets[:, :, None], sets[:, None, :]]
+        own = np.arange(sets.shape[1])
+        matrix[:, own, own] += spread[sets] ** -2.0
+        right = held.with_residual[sets]
+        amplitudes = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+        refused = one_sided[sets] & (amplitudes < 0.0)
+        if sets.shape[1] == 1:
+            amplitudes[refused] = 0.0
+            refused[:] = False
+        costs = held.cost - np.sum(right * amplitudes, axis=1)
+        side = held.sides(sets, amplitudes)
+        moved = np.any(side != held.side, axis=1) | refused.any(axis=1)
+        for index in np.flatnonzero(moved):
+            costs[index] = self.cost(sets[index], spread, one_sided, side[index])
+        return costs
+
+    def cost(
+        self,
+        members: Sequence[int],
+        spread: Array,
+        one_sided: Array,
+        begin: NDArray[np.int64] | None = None,
+    ) -> float:
+        """Least of the quadratic form with the columns of one set, amplitudes included.
+
+        Parameters as of :meth:`costs`; ``begin`` says which of the box's coordinates may be held, as
+        :func:`bounded_minimum` has it.
         """
         own = np.asarray(members, dtype=int)
         p = len(self.box.low)
@@ -154,8 +192,77 @@ class BoxedColumns:
         right = np.concatenate((self.box.downhill, self.with_residual[own]))
         low = np.concatenate((self.box.low, np.where(one_sided[own], 0.0, -np.inf)))
         high = np.concatenate((self.box.high, np.full(len(own), np.inf)))
-        move = bounded_minimum(matrix, right, low, high)
+        side = None if begin is None else np.append(begin, np.zeros(len(own), dtype=int))
+        move = bounded_minimum(matrix, right, low, high, side)
         return self.box.cost + float(move @ (matrix @ move)) - 2.0 * float(right @ move)
+
+
+@dataclass(frozen=True, slots=True)
+class HeldColumns:
+    """Columns beside a box whose coordinates are where the box alone has them at bounds, the others free.
+
+    Attributes
+    ----------
+    side : (p,) ndarray
+        -1 for a coordinate at its lower bound, 1 at its upper one, 0 for a free one.
+    moves, by_columns : (p,) and (p, m) ndarray
+        Moves of the free coordinates without columns, and less with each unit of one.
+    pull, pull_less : (p,) and (p, m) ndarray
+        By how much a held coordinate would move by itself, and less with each unit of a column.
+    cost : float
+        Without columns.
+    with_columns, with_residual : (m, m) and (m,) ndarray
+        Inner products in which what free coordinates absorb does not count.
+    """
+
+    box: Box
+    side: NDArray[np.int64]
+    moves: Array
+    by_columns: Array
+    pull: Array
+    pull_less: Array
+    cost: float
+    with_columns: Array
+    with_residual: Array
+
+    @classmethod
+    def of(cls, boxed: BoxedColumns) -> HeldColumns:
+        """From the least of the box alone."""
+        box, columns = boxed.box, boxed.with_jacobian
+        moves = bounded_minimum(box.hessian, box.downhill, box.low, box.high)
+        side = (moves >= box.high).astype(int) - (moves <= box.low)
+        free = side == 0
+        by_columns = np.zeros_like(columns)
+        if free.any():
+            factor = cho_factor(box.hessian[np.ix_(free, free)])
+            right = box.downhill[free] - box.hessian[np.ix_(free, ~free)] @ moves[~free]
+            moves[free] = cho_solve(factor, right)
+            by_columns[free] = cho_solve(factor, columns[free])
+        steepness = np.diag(box.hessian)
+        return cls(
+            box,
+            side,
+            moves,
+            by_columns,
+            (box.downhill - box.hessian @ moves) / steepness,
+            (columns - box.hessian @ by_columns) / steepness[:, None],
+            box.cost + float(moves @ (box.hessian @ moves)) - 2.0 * float(box.downhill @ moves),
+            boxed.with_columns - columns[free].T @ by_columns[free],
+            boxed.with_residual - columns.T @ moves,
+        )
+
+    def sides(self, sets: NDArray[np.int64], amplitudes: Array) -> NDArray[np.int64]:
+        """Sides (k, p) on which coordinates are after amplitudes (k, s), those that were wrong changed."""
+        box = self.box
+        moves = self.moves - np.einsum("pks,ks->kp", self.by_columns[:, sets], amplitudes, optimize=True)
+        pull = self.pull - np.einsum("pks,ks->kp", self.pull_less[:, sets], amplitudes, optimize=True)
+        free = self.side == 0
+        found = np.broadcast_to(self.side, moves.shape).copy()
+        found[free & (moves < box.low - NEAR)] = -1
+        found[free & (moves > box.high + NEAR)] = 1
+        leaving = ((self.side < 0) & (pull > NEAR)) | ((self.side > 0) & (pull < -NEAR))
+        found[leaving & (box.low < box.high)] = 0
+        return found
 
 
 @dataclass(frozen=True, slots=True)

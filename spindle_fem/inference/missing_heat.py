@@ -170,7 +170,7 @@ def onset_answers(
     recording: int,
     *,
     number: int = tuned.ONSETS,
-    trust: Fit | None = None,
+    linear: LinearProblem | None = None,
     workers: Workers | None = None,
 ) -> list[Onsets]:
     """Inner products of all spots' responses about a fit.
@@ -181,12 +181,12 @@ def onset_answers(
         The one in which heat comes and goes.
     number : int
         Instants.
-    trust : Fit or None
-        As :meth:`LinearProblem.about` has it.
+    linear : LinearProblem or None
+        About the fit, where it is known.
     workers : Workers or None
         Processes that work them out; the result does not depend on it.
     """
-    linear = LinearProblem.about(problem, fit, trust)
+    linear = LinearProblem.about(problem, fit) if linear is None else linear
     chunk = max(1, COLUMNS // number)
     chunks = [patterns[first : first + chunk] for first in range(0, len(patterns), chunk)]
     jobs = [

@@ -91,7 +91,7 @@ def exchanged(search: Search) -> None:
                         or (is_spindle and member.kind == SENSOR != c.kind)
                     ),
                 )
-    search.fit_all(tasks)
+    search.fit_all(tasks, reach=tuned.EXCHANGED_REACH)
 
 
 def _with_laws(
@@ -102,10 +102,16 @@ def _with_laws(
     if base is None:
         return []
     if identity(rest) not in search.screenings:
-        search.screened(base.fit)
+        search.screened(base.fit, only_laws=True)
     screened = search.screenings[identity(rest)]
     found = screened.best_of(lambda c: allowed(c) and not search.in_intervals(c), tuned.EFFECTS_EXCHANGED)
-    return [search.task(base.fit, [(screened.variants[index], amplitude)], {}) for index, amplitude in found]
+    gains = screened.singles()
+    least = tuned.LEAST_PROMISED_SHARE * float(gains.max(initial=0.0))
+    return [
+        search.task(base.fit, [(screened.variants[index], amplitude)], {})
+        for index, amplitude in found
+        if gains[index] >= least
+    ]
 
 
 def at_other_spots(search: Search, fit: Fit, member: Candidate, rest: tuple[Candidate, ...]) -> list[Task]:
@@ -113,7 +119,7 @@ def at_other_spots(search: Search, fit: Fit, member: Candidate, rest: tuple[Cand
     kept = {name: value for name, value in fit.values.items() if name not in member.parameters}
     left = search.problem.fit(rest, kept, iterations=0)
     tasks: list[Task] = []
-    for found, candidate in search.interval_candidates(left, None):
+    for found, candidate in search.interval_candidates(left):
         if len(tasks) == tuned.OTHER_SPOTS:
             break
         if identity((*rest, candidate)) not in search.found:

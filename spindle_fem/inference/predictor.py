@@ -32,12 +32,12 @@ from spindle_fem.inference.prediction import Prediction, acting_in
 from spindle_fem.inference.priors import Prior, priors_of
 from spindle_fem.inference.recording_gaps import (
     channel_changes,
-    earlier,
     gap_pieces,
     hidden_forcing,
     hidden_in,
     jump_forcing,
     unseen_jumps,
+    weights_of_earlier,
 )
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
 from spindle_fem.model.reduced.drive import FITTED, Drive, drive_of_recording, inputs_at
@@ -412,15 +412,20 @@ class Predictor:
             places = [derivatives.index(known[k]) for k in asked]
             predicted.sensitivity[:, :, places] += slopes[:, :, asked]
         for kind, open_ones in ((JUMP_PREFIX, self._jumps[number]), (GAP_PREFIX, self._hidden[number])):
-            if not open_ones:
+            names = [f"{kind}{number}.{index}" for index in range(len(open_ones))]
+            if not any(name in values or name in derivatives for name in names):
                 continue
-            prefix = f"{kind}{number}."
-            for name in {name for name in (*values, *derivatives) if name.startswith(prefix)}:
-                value, index = values.get(name, 0.0), int(name.removeprefix(prefix))
-                change, slope = self._opened(kind, number, index, value)
-                predicted.temperature[:] += change
-                if name in derivatives:
-                    predicted.sensitivity[:, :, derivatives.index(name)] += slope
+            columns, at = self._columns_of(kind, number), np.array([values.get(n, 0.0) for n in names])
+            if kind == JUMP_PREFIX:
+                at, by = weights_of_earlier(np.array([most for *_, most in open_ones]), at)
+            change = columns.reshape(-1, at.size) @ at.ravel()
+            predicted.temperature[:] += change.reshape(predicted.temperature.shape)
+            asked = [index for index, name in enumerate(names) if name in derivatives]
+            if asked:
+                own = columns[:, :, asked]
+                if kind == JUMP_PREFIX:
+                    own = np.einsum("gcnt,nt->gcn", own, by[asked])
+                predicted.sensitivity[:, :, [derivatives.index(names[i]) for i in asked]] += own
 
     def directions_of(self, number: int) -> tuple[list[str], Array]:
         """Coordinates of directions that do something in a recording, and what they do, (G + 1, c, k) K."""
@@ -434,7 +439,8 @@ class Predictor:
         """Change of the channels (G + 1, c) [K] by what gaps and rows leave open, and with each unit more."""
         columns = self._columns_of(kind, number)
         if kind == JUMP_PREFIX:
-            return earlier(columns[:, :, index], self._jumps[number][index][2], value)
+            most = np.array([self._jumps[number][index][2]])
+            return tuple(columns[:, :, index] @ own[0] for own in weights_of_earlier(most, np.array([value])))
         return value * columns[:, :, index], columns[:, :, index]
 
     def _columns_of(self, kind: str, number: int) -> Array:

@@ -33,8 +33,10 @@ EXPECTED_SLOW = SlowError(tuned.EXPECTED_SLOW_SIGMA, tuned.EXPECTED_SLOW_TIME)
 # Correlation times that are tried for a network, from that between readings to this share of its recording.
 NETWORK_TIMES = 6
 LONGEST_SHARE = 0.1
-# Fits to calibration recordings: slow error and what directions do follow from the one before.
+# Fits to calibration recordings at most: slow error and what directions do follow from the one before.
 CALIBRATION_ROUNDS = 3
+# Largest move of a coordinate, in deviations of its prior, after which another round changes nothing.
+SETTLED = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,9 +267,11 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
         if fit is not None:
             # Directions are linearised about the fitted numbers.
             earlier = with_misdescriptions(earlier, earlier.misdescribed, fit.values)
-        problem = Problem(earlier, prior, slow, earlier.observations)
+        problem, before = Problem(earlier, prior, slow, earlier.observations), fit
         fit = problem.fit((), None if fit is None else fit.values)
         slow = slow_error_of(problem, fit)
+        if before is not None and np.abs(fit.position - before.position).max(initial=0.0) < SETTLED:
+            break
     # Channels that only the diagnosed recordings have stay as they were known before.
     slow = _with_displacements_of(slow, predictor)
     belief = known_before(predictor)

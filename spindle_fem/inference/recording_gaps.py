@@ -194,23 +194,37 @@ def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, fl
     return forcing.reshape(*forcing.shape[:2], -1)
 
 
-def earlier(changes: Array, most: float, seconds: float) -> tuple[Array, Array]:
-    """Change of the channels [K] where an input changed some seconds earlier, and with each more [K/s].
+def weights_of_earlier(most: Array, seconds: Array) -> tuple[Array, Array]:
+    """Weights of the times followed where inputs changed some seconds earlier, and with each second more.
 
-    Straight between the times that were followed, and on as from the first.
+    Cubic between those times, with slopes from the times to either side (Catmull and Rom), as a fit stops at
+    a kink; straight on beyond them.
 
     Parameters
     ----------
-    changes : (..., TIMES) ndarray, [K]
-        For each of them.
-    most : float, [s]
-        The longest of them.
+    most, seconds : (n,) ndarray, [s]
+        Longest time that was followed of each, and the time in question.
+
+    Returns
+    -------
+    two (n, TIMES) ndarray
+
+    >>> [item.tolist() for item in weights_of_earlier(np.array([40.0]), np.array([20.0]))]
+    [[[0.0, 1.0, 0.0, 0.0]], [[-0.05, 0.0, 0.05, 0.0]]]
     """
     part = most / TIMES
-    piece = int(np.clip(seconds / part, 0, TIMES - 1))
-    before = changes[..., piece - 1] if piece else np.zeros(changes.shape[:-1])
-    slope = (changes[..., piece] - before) / part
-    return before + (seconds - piece * part) * slope, slope
+    piece = np.clip(seconds / part, 0, TIMES - 1).astype(int)
+    value = np.eye(TIMES + 1)
+    slope = np.gradient(value, axis=0)
+    ends = np.stack((value[piece], value[piece + 1], slope[piece], slope[piece + 1]))
+    place = seconds / part - piece
+    s = np.clip(place, 0.0, 1.0)
+    rest, later = 1.0 - s, s**2 * (3.0 - 2.0 * s)
+    at = np.array([1.0 - later, later, s * rest**2, -(s**2) * rest])
+    by = np.array([-6.0 * s * rest, 6.0 * s * rest, rest * (1.0 - 3.0 * s), s * (3.0 * s - 2.0)])
+    slopes = np.einsum("en,enk->nk", by, ends)
+    weights = np.einsum("en,enk->nk", at, ends) + (place - s)[:, None] * slopes
+    return weights[:, 1:], slopes[:, 1:] / part[:, None]
 
 
 def hidden_forcing(run: TransientRun, fast: FastModel, hidden: Sequence[Hidden]) -> Array:

@@ -67,8 +67,7 @@ class Screened:
 
     def _gain_within(self, sets: NDArray[np.int64]) -> Array:
         """Gain of sets (k, s) with the machine's coordinates between their bounds."""
-        one_sided = self.signs != 0.0
-        costs = np.array([self.boxed.cost(members, self.spread, one_sided) for members in sets])
+        costs = self.boxed.costs(sets, self.spread, self.signs != 0.0)
         return 0.5 * (self.base - costs) - self._price(sets, self._scaled(sets))
 
     def _scaled(self, sets: NDArray[np.int64]) -> Array:
@@ -217,6 +216,7 @@ def screen(
     families: Mapping[str, str],
     trust: Fit | None = None,
     workers: Workers | None = None,
+    linear: LinearProblem | None = None,
 ) -> Screened:
     """Responses of all variants about a fit, and their inner products.
 
@@ -232,16 +232,16 @@ def screen(
         outliers; None for the first one.
     workers : Workers or None
         Processes that compute the responses; the result does not depend on it.
+    linear : LinearProblem or None
+        About the fit, where it is known.
     """
     # The same pieces with or without workers, so that the result is the same.
     pieces = [tuple(variants[first::PIECES]) for first in range(PIECES)]
-    *answers, linear = (workers or Workers()).done(
-        problem,
-        [
-            *(partial(_answers, fit=fit, variants=piece) for piece in pieces),
-            partial(LinearProblem.about, fit=fit, trust=trust),
-        ],
-    )
+    jobs = [partial(_answers, fit=fit, variants=piece) for piece in pieces]
+    if linear is None:
+        jobs.append(partial(LinearProblem.about, fit=fit, trust=trust))
+    answers = (workers or Workers()).done(problem, jobs)
+    linear = answers.pop() if linear is None else linear
     columns = np.empty((len(problem.data), len(variants)))
     for first, found in enumerate(answers):
         columns[:, first::PIECES] = found

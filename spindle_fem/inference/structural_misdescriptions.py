@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 
 # Unit in which a report states a direction, and its size in the model's unit.
 TOLD_IN = {"m": ("mm", 1e-3)}
+# Operating points whose coefficients differ by less than this share have the same operators here: columns of
+# quantities that are known to their prior width need not be exact.
+SAME_WITHIN = 0.01
 # Columns of all directions (G + 1, c, n), which one march gives together.
 _known: WeakKeyDictionary[BaseRun, dict[str, Array]] = WeakKeyDictionary()
 # The model with the directions of every fast model in use.
@@ -43,7 +46,7 @@ def structural_columns(base: BaseRun) -> dict[str, Array]:
     """Change of every channel for a unit of each direction, (G + 1, c) K, by direction."""
     model = model_with_directions(base.predictor.fast)
     names = tuple(item.name for item in model.structural)
-    own = base.predictor.with_model(model)
+    own = base.predictor.with_model(model, SAME_WITHIN)
     predicted = own.predict(base.number, base.values, base.candidates, names)
     return {name: predicted.sensitivity[:, :, column] for column, name in enumerate(names)}
 

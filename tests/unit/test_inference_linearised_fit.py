@@ -1,5 +1,7 @@
 """First order about a fit: quadratic forms with bounds, against a plain search over the same form."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear, minimize
@@ -47,6 +49,17 @@ def test_the_least_cost_within_bounds_is_the_true_one(room, members):
     start = np.zeros(COORDINATES + len(own))
     found = minimize(cost, start, bounds=bounds, method="L-BFGS-B", options={"ftol": 1e-15, "gtol": 1e-10})
     assert boxed.cost(members, spread, one_sided) == pytest.approx(found.fun, rel=1e-7)
+
+
+@pytest.mark.parametrize("room", [0.05, 0.3, 1.0, 50.0])
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_many_sets_cost_what_each_does_alone(room, size):
+    boxed = problem(room)[1]
+    spread = np.array([0.5, 1.0, 2.0, 0.3, 1.0])
+    one_sided = np.array([True, False, True, False, True])
+    sets = np.array(list(combinations(range(COLUMNS), size)))
+    alone = [boxed.cost(members, spread, one_sided) for members in sets]
+    assert boxed.costs(sets, spread, one_sided) == pytest.approx(alone, rel=1e-9)
 
 
 def test_bounds_matter_only_where_they_hold_something_back():
