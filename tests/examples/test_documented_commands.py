@@ -62,10 +62,22 @@ def run_page(page, reader, *, long, known=()):
         if command.words[1].startswith("--"):
             continue  # has a test of its own
         run = in_a_process if reader.is_long(command) else run_here
-        done = run(*given, cwd=reader.folder)
+        with scheduler_of(given) as typed:
+            done = run(*typed, cwd=reader.folder)
         assert done.returncode == 0, f"{page.name}:{command.line}: {given}\n{done.stdout}\n{done.stderr}"
         ran.append(command)
     return ran
+
+
+@contextlib.contextmanager
+def scheduler_of(given):
+    """What is typed, with the address of a Dask scheduler that has one worker where a page leaves it open."""
+    if "ADDRESS" not in given:
+        yield given
+        return
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        yield [cluster.scheduler_address if item == "ADDRESS" else item for item in given]
 
 
 def said(command):
