@@ -329,14 +329,10 @@ def _fields_along(
 ) -> tuple[Scene, tuple[str, ...]]:
     """Machine with its field along a recording; grey, and why, where the full model cannot follow it."""
     from spindle_fem.inference.full_model_check import COARSE, spec_on
-    from spindle_fem.operation.bearing_heat import without_unasked_preload
     from spindle_fem.solvers.prepared_machine import prepare_machine
     from spindle_fem.studies.recorded_fields import fields_of_recording
 
     specs = {name: load_machine(path) for name, path in machines.items()}
-    if AFTER in machines:
-        # as the diagnosis has them, whose predictions stand beside these fields
-        specs = {name: without_unasked_preload(spec)[0] for name, spec in specs.items()}
     fields: dict[str, Array] = {}
     mesh = None
     try:

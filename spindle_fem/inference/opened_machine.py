@@ -14,7 +14,9 @@ from spindle_fem.definition.load import find_machine, load_machine, read_definit
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.errors import RecordingError
+from spindle_fem.effects.registry import effects_in_definition
+from spindle_fem.errors import ConvergenceError, RecordingError
+from spindle_fem.inference.followed_model import with_followed_preload
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.input_sampling import unseen_power
 from spindle_fem.inference.recording_gaps import with_changes_amid
@@ -25,7 +27,7 @@ from spindle_fem.model.reduced.defined_effects import ActiveEffects, effects_on
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.model.reduced.recorded_model import fast_model_for
-from spindle_fem.operation.bearing_heat import without_unasked_preload
+from spindle_fem.operation.bearing_heat import at_assembly_size
 from spindle_fem.operation.preload_mechanics import machine_view
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.channel_checks import Flag
@@ -103,22 +105,36 @@ def open_machine(
         raise RecordingError("recordings", "there are none.", "Give at least one to be diagnosed.")
     if network_spec.is_network_machine(read_definition(find_machine(machine))):
         return _open_network(machine, overrides, recordings, calibration, heldout)
-    spec, left_out = without_unasked_preload(load_machine(machine, overrides))
+    given = load_machine(machine, overrides)
+    spec = at_assembly_size(given)
     recordings, notes = _denoised(recordings)
     calibration, more = _denoised(calibration)
-    fast = fast_model_for(spec, (*recordings, *calibration), progress=progress)
-    for recording in (*recordings, *calibration):
+    every = (*recordings, *calibration)
+    fast = fast_model_for(spec, every, progress=progress)
+    for recording in every:
         fast.require_channels(recording.probes, recording.source)
+    effects = effects_on(spec.effects, fast, recordings[0])
     view = _widest([machine_view(fast.names, _seen(recording, heldout)) for recording in recordings])
+    if given.follows_preload:
+        try:
+            fast, error = with_followed_preload(given, fast, every, effects, progress=progress)
+        except ConvergenceError as failed:
+            notes.append(f"thermal preload is left out, bearings keep the size of assembly: {failed.what}")
+        else:
+            spec, view = given, replace(view, has=view.has | effects_in_definition(given))
+            notes.append(
+                "preload follows the temperatures, by bearing mechanics at states of the machine as defined "
+                f"along these recordings; between them friction errs by {100.0 * error:.2g} % at most"
+            )
     return DiagnosedMachine(
         spec.name,
         spec,
         fast,
-        effects_on(spec.effects, fast, recordings[0]),
+        effects,
         view,
         tuple(recordings),
         tuple(calibration),
-        (*left_out, *notes, *more),
+        (*notes, *more),
     )
 
 

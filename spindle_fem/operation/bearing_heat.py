@@ -122,20 +122,6 @@ def at_assembly_size(spec: MachineSpec) -> MachineSpec:
     return spec.model_copy(update={"heat": spec.heat.model_copy(update={"thermal_preload": False})})
 
 
-def without_unasked_preload(spec: MachineSpec) -> tuple[MachineSpec, tuple[str, ...]]:
-    """The machine for models that cannot follow its preload, and in words what that leaves out.
-
-    Where the definition does not ask for it (``heat.thermal_preload``), bearings keep the size of assembly.
-    """
-    if not spec.follows_preload or spec.heat.thermal_preload is not None:
-        return spec, ()
-    note = (
-        "thermal preload is left out: in this fast model bearings keep the size of assembly "
-        "(spindle-fem run, transient and simulate follow it)"
-    )
-    return at_assembly_size(spec), (note,)
-
-
 def table_heat(spec: MachineSpec, point: OperatingPoint) -> tuple[dict[str, float], tuple[CodedWarning, ...]]:
     """Heat of every bearing by the table, W: linear in speed, first order in thrust.
 

@@ -13,6 +13,8 @@ import pytest
 from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.definition.load import load_machine, write_machine
 from spindle_fem.inference.followed_model import with_followed_preload
+from spindle_fem.inference.opened_machine import open_machine
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
 from spindle_fem.model.reduced.recorded_model import fast_model_for
 from spindle_fem.operation.bearing_heat import at_assembly_size
@@ -73,6 +75,18 @@ def test_without_it_the_same_recording_is_missed(measured, tmp_path):
     found = simulate_machine(measured.machine, measured.place, tmp_path, overrides=overrides)
     assert max(channel["max_K"] for channel in found["channels"]) > 0.3
     assert "preload_N" not in found
+
+
+@pytest.mark.slow
+def test_a_diagnosis_follows_it_and_does_not_look_for_it(measured):
+    recording = read_recording(measured.place)
+    opened = open_machine(measured.machine, (), [recording], [])
+    predicted = Predictor(opened.fast, [recording], at_stamps=True).predict(0, {}).temperature
+    for number, name in enumerate(("SP01", "SP05")):
+        assert np.abs(predicted[:, number] - measured.full.reading(name)).max() < 0.05, name
+    assert "thermal_preload" in opened.view.has
+    assert opened.spec.follows_preload
+    assert any("preload follows the temperatures" in note for note in opened.notes)
 
 
 @pytest.mark.slow
