@@ -11,6 +11,7 @@ from spindle_fem.inference.hidden_states import without
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search
+from spindle_fem.inference.input_sampling import left_over_noise
 from spindle_fem.inference.neighbouring_sets import exchanged, reduced, widened
 from spindle_fem.inference.state_search import add_states, settle_best, simulated
 from spindle_fem.inference.step_search import add_steps
@@ -44,6 +45,7 @@ def run_search(search: Search) -> list[Hypothesis]:
     is_network = search.problem.predictor.is_network
     if is_network:
         _what_changes(search, starts[-1][0])
+        _second_state(search)
     if not search.is_explained(search.ranked()[0]):
         search.progress("diagnosis: 2 effects")
         for fit, screened, intervals in reversed(starts):
@@ -99,12 +101,14 @@ def _beside(search: Search) -> None:
     """
     best = search.ranked()[0]
     for _ in range(LARGEST_SET):
-        if not 0 < len(best.keys) < LARGEST_SET or search.is_explained(best):
+        if not 0 < len(best.keys) < LARGEST_SET or _leaves_little(search, best):
             return
         search.progress("diagnosis: beside the best set")
         if not any(search.is_hidden_state(c) for c in best.fit.candidates):
             laws = [h.fit for h in search.ranked() if _only_laws(search, h)]
             _what_changes(search, laws[0])
+        else:
+            add_states(search, best.fit, 1)
         screened, intervals = search.screened(best.fit)
         search.extend(best.fit, screened, intervals, 1, tuned.ADDITIONS)
         settle_best(search)
@@ -113,6 +117,24 @@ def _beside(search: Search) -> None:
             # A state that is followed again gains a little every time.
             return
         best = again
+
+
+def _second_state(search: Search) -> None:
+    """Look for another state beside the best one, before laws take up what it does."""
+    best = search.ranked()[0]
+    if any(search.is_hidden_state(c) for c in best.fit.candidates) and not _leaves_little(search, best):
+        add_states(search, best.fit, 1)
+
+
+def _leaves_little(search: Search, best: Hypothesis) -> bool:
+    """Whether a set leaves no more than errors that were expected, nor than single readings may leave."""
+    if not search.is_explained(best):
+        return False
+    problem, fit = search.problem, best.fit
+    predicted = problem.predict(fit.candidates, fit.coordinates, fit.position, by=())
+    readings = [i.at(predicted[i.recording].temperature[:, i.channel]) for i in problem.observations]
+    left = left_over_noise(problem.predictor, problem.observations, readings, fit.values)
+    return left <= tuned.MOST_LEFT
 
 
 def _what_changes(search: Search, fit: Fit) -> None:

@@ -41,6 +41,8 @@ Array = NDArray[np.float64]
 START_SIZES = (0.3, 1.5)
 # Fewer intervals than this are single events, whose edges are free.
 FEWEST = 4
+# Rounds in which several states are inferred in turn.
+SEVERAL_ROUNDS = 2
 # Width of a state's edges over the steps of a fit, from which means over steps are right to 0.3 %: the
 # error of sums over a logistic function falls with exp(-2 pi² width/step).
 BLUR = 0.3
@@ -70,8 +72,13 @@ def state_places(search: Search) -> list[StatePlace]:
 
 
 def add_states(search: Search, fit: Fit, number: int = tuned.STATE_PLACES) -> None:
-    """Fit the sets with a state beside what a fit holds, at the most promising places."""
-    if any(search.in_intervals(c) for c in fit.candidates):
+    """Fit the sets with a state beside what a fit holds, at the most promising places.
+
+    Beside one state another may switch, elsewhere or by another effect; not beside intervals or levels, which
+    are the same thing in other words.
+    """
+    events = [c for c in fit.candidates if search.in_intervals(c)]
+    if len(events) > 1 or not all(search.is_hidden_state(c) for c in events):
         return
     problem = search.problem
     recordings = range(len(problem.predictor.recordings))
@@ -79,6 +86,8 @@ def add_states(search: Search, fit: Fit, number: int = tuned.STATE_PLACES) -> No
     bases = [BaseRun(problem.predictor, n, fit.values, fit.candidates) for n in recordings]
     found: list[tuple[float, StatePlace, Course]] = []
     for place in state_places(search):
+        if (place.effect.name, search.view.component(place.pattern.spot)) in fit.keys:
+            continue
         courses = _courses(search, bases[place.recording], readings[place.recording], place)
         found += [(course.log_evidence, place, course) for course in courses]
     found.sort(key=lambda item: -item[0])
@@ -137,34 +146,47 @@ def inferred_states(
 
     On the steps of the problem, which may be others than those of the search.
     """
-    found = {}
-    for candidate in fit.candidates:
-        if not search.is_hidden_state(candidate):
-            continue
-        place, course, _ = search.courses[candidate.amplitude]
-        drive = problem.predictor.drives[place.recording]
-        course = _on_steps(course, search.problem.predictor.drives[place.recording].grid, drive.grid)
-        own = replace(search, problem=problem)
-        again = course_about(own, fit, place, candidate, course, everything=True, effort=effort)
-        if again is None:
-            continue
-        intervals = intervals_of(again.on, drive.grid)
-        middle = 0.5 * (drive.grid[1:] + drive.grid[:-1])
-        within = [(middle > start) & (middle < end) for start, end in intervals]
-        probability = tuple(float(again.probability[rows].mean()) for rows in within)
-        state = InferredState(_candidate(search, place, intervals, again), probability)
-        length = np.diff(drive.grid)
-        on = np.where(again.on, length, 0.0)
-        conditions = conditions_of_inputs(BaseRun(problem.predictor, place.recording, *_bare(fit, candidate)))
-        inside = {name: float(on[zero == 1].sum() / on.sum()) for name, zero in conditions.items()}
-        usual = {name: float(length[zero == 1].sum() / length.sum()) for name, zero in conditions.items()}
-        # The input that says most of what is on: nearly all of it, in least of the time.
-        best = max(inside, key=lambda name: inside[name] - usual[name], default="")
-        if best and inside[best] > MOSTLY_INSIDE and inside[best] - usual[best] > TELLS:
-            filled = float(on[conditions[best] == 1].sum() / length[conditions[best] == 1].sum())
-            state = replace(state, gate=best, inside=inside[best], filled=filled)
-        found[candidate.amplitude] = state
+    hidden = [c.amplitude for c in fit.candidates if search.is_hidden_state(c)]
+    found: dict[str, InferredState] = {}
+    # Of several each depends on what the others did where no fitted reading tells.
+    for _ in range(min(len(hidden), SEVERAL_ROUNDS)):
+        for name in hidden:
+            state = _inferred(search, problem, fit, name, effort)
+            if state is not None:
+                found[name] = state
+                candidates = tuple(state.candidate if c.amplitude == name else c for c in fit.candidates)
+                fit = replace(fit, candidates=candidates)
     return found
+
+
+def _inferred(
+    search: Search, problem: Problem, fit: Fit, name: str, effort: tuple[int, int]
+) -> InferredState | None:
+    """One hidden state of a fit inferred from all readings; None where nothing switches."""
+    candidate = next(c for c in fit.candidates if c.amplitude == name)
+    place, course, _ = search.courses[name]
+    drive = problem.predictor.drives[place.recording]
+    course = _on_steps(course, search.problem.predictor.drives[place.recording].grid, drive.grid)
+    own = replace(search, problem=problem)
+    again = course_about(own, fit, place, candidate, course, everything=True, effort=effort)
+    if again is None:
+        return None
+    intervals = intervals_of(again.on, drive.grid)
+    middle = 0.5 * (drive.grid[1:] + drive.grid[:-1])
+    within = [(middle > start) & (middle < end) for start, end in intervals]
+    probability = tuple(float(again.probability[rows].mean()) for rows in within)
+    state = InferredState(_candidate(search, place, intervals, again), probability)
+    length = np.diff(drive.grid)
+    on = np.where(again.on, length, 0.0)
+    conditions = conditions_of_inputs(BaseRun(problem.predictor, place.recording, *_bare(fit, candidate)))
+    inside = {key: float(on[zero == 1].sum() / on.sum()) for key, zero in conditions.items()}
+    usual = {key: float(length[zero == 1].sum() / length.sum()) for key, zero in conditions.items()}
+    # The input that says most of what is on: nearly all of it, in least of the time.
+    best = max(inside, key=lambda key: inside[key] - usual[key], default="")
+    if best and inside[best] > MOSTLY_INSIDE and inside[best] - usual[best] > TELLS:
+        filled = float(on[conditions[best] == 1].sum() / length[conditions[best] == 1].sum())
+        state = replace(state, gate=best, inside=inside[best], filled=filled)
+    return state
 
 
 def _on_steps(course: Course, grid: Array, other: Array) -> Course:

@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 from scipy.stats import chi2, norm
 
-from spindle_fem.effects.framework.effect import Candidate, in_intervals
-from spindle_fem.effects.registry import effect_of
+from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference import tuned
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked
@@ -397,29 +396,24 @@ def unexplained_share(rest: float) -> float:
 def _with_needed_events(
     hypotheses: Sequence[Hypothesis], left: Callable[[Fit], float], beyond: Callable[[Fit], float]
 ) -> list[Hypothesis]:
-    """Sets without those of whose laws some, or none, leave no more of the readings than may be left of them.
+    """Sets without those of which some members, with fewer events, leave no more than may be left of them.
 
     Neither in units of the noise nor of the errors that were expected before these readings, and held-out
     ones not much more than the set. What may come and go at any time fits some of whatever a coarse picture
     leaves, and follows held-out readings itself: that they become a little likelier with it says nothing.
     """
-
-    def only_laws(item: Hypothesis) -> frozenset:
-        laws = [c for c in item.fit.candidates if not in_intervals(effect_of(c.effect), c)]
-        return frozenset((c.effect, c.component) for c in laws)
-
-    plain = [item for item in hypotheses if not free_in_time(item.fit)]
+    events = {id(item): free_in_time(item.fit) for item in hypotheses}
 
     def needed(item: Hypothesis) -> bool:
         return all(
             np.sqrt(other.expected_misfit) > tuned.UNEXPLAINED_MISFIT
             or max(left(other.fit), beyond(other.fit)) > tuned.MOST_LEFT
             or 0.0 < beyond(item.fit) < (1.0 - tuned.IMPROVEMENT_OF_EVENTS) * beyond(other.fit)
-            for other in plain
-            if other.keys <= only_laws(item)
+            for other in hypotheses
+            if other.keys < item.keys and events[id(other)] < events[id(item)]
         )
 
-    return [item for item in hypotheses if not free_in_time(item.fit) or needed(item)]
+    return [item for item in hypotheses if not events[id(item)] or needed(item)]
 
 
 def _without_parts(

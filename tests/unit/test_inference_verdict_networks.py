@@ -40,6 +40,29 @@ def test_events_of_a_network_are_named_where_laws_without_them_leave_too_much():
     assert found(little, much, replace(null, expected_misfit=3.0), alone) == alone.keys
 
 
+def test_a_second_event_is_named_where_one_leaves_too_much():
+    def event(place):
+        term = UnrecordedHeatTerm(
+            place, TermParameter("heat", 1.0, 1.2), Spread(()), InIntervals([(0.0, 9.0)])
+        )
+        return replace(candidate("unrecorded_heat_source", place), terms=(term,))
+
+    oil, block = event("oil"), event("block")
+    null, one = hypothesis(misfit=9000.0), hypothesis(oil, misfit=900.0)
+    both = hypothesis(oil, block, misfit=400.0)
+    for left_by_one, expected in ((0.9, one), (1.1, both)):
+        rest = {id(null.fit): 9.0, id(one.fit): left_by_one * tuned.MOST_LEFT}
+        found = verdict(
+            null,
+            one,
+            both,
+            coarseness=2.0,
+            left=lambda fit, rest=rest: rest.get(id(fit), 1.0),
+            beyond=lambda fit: 1.0,
+        )
+        assert found.chosen.fit.keys == expected.keys
+
+
 def test_a_part_that_leaves_too_much_gives_way_to_the_whole_that_leaves_little():
     null, part = hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=400.0)
     whole = hypothesis(PRELOAD, OFFSET, misfit=399.0)

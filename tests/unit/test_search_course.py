@@ -39,6 +39,7 @@ class Ever:
 )
 def test_a_state_that_gains_a_little_every_time_is_not_followed_for_ever(monkeypatch, gain, rounds):
     monkeypatch.setattr(search_course, "settle_best", lambda search: None)
+    monkeypatch.setattr(search_course, "add_states", lambda search, fit, number: None)
     search = Ever(gain)
     search_course._beside(search)
     assert search.rounds == rounds
