@@ -331,7 +331,8 @@ def test_equations_are_renewed_as_they_are_made_anew():
         own, anew = kept.of(given), Equations.of(given)
         for name in ("data", "indices", "indptr"):
             np.testing.assert_array_equal(getattr(own.matrix, name), getattr(anew.matrix, name))
-        np.testing.assert_array_equal(own.system.matrix.data, anew.system.matrix.data)
+        if own.system.matrix is not None:
+            np.testing.assert_array_equal(own.system.matrix.data, anew.system.matrix.data)
         np.testing.assert_array_equal(own.system.exchange.toarray(), anew.system.exchange.toarray())
         # loads count from another temperature: what is solved is the same
         shift = own.system.reference_temperature - anew.system.reference_temperature

@@ -34,12 +34,8 @@ def assemble_system(problem: ConductionProblem, reference: float | None = None) 
     """
     if problem.film_laws:
         raise SpecError("problem", "film laws must be linearised before assembly.", "Use linearise_films.")
-    operators = problem.operators
-    upper = operators.sum_conduction(conductivity_of_parts(problem))
-    exchange = facet_exchange(problem)
-    for joint, conductance in exchange.joints.items():
-        operators.add_joint(upper, joint, conductance)
-    operators.add_films(upper, exchange.coefficient)
+    operators, exchange = problem.operators, facet_exchange(problem)
+    upper = assemble_upper(problem, exchange)
     if reference is None:
         reference = reference_temperature(problem)
     load, lumped_load = assemble_load(problem, reference)
@@ -53,6 +49,16 @@ def assemble_system(problem: ConductionProblem, reference: float | None = None) 
         _tie_matrix(operators, exchange.ties),
         operators.prolongation,
     )
+
+
+def assemble_upper(problem: ConductionProblem, exchange: FacetExchange) -> NDArray[np.float64]:
+    """Upper entries of a problem's matrix, (n_upper,) [W/K]."""
+    operators = problem.operators
+    upper = operators.sum_conduction(conductivity_of_parts(problem))
+    for joint, conductance in exchange.joints.items():
+        operators.add_joint(upper, joint, conductance)
+    operators.add_films(upper, exchange.coefficient)
+    return upper
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from spindle_fem.model.mesh.huge_pages import room
 from spindle_fem.model.mesh.linear_solvers import multiply
 from spindle_fem.model.mesh.threads import combined, dots
 
@@ -33,7 +34,8 @@ class RecentCorrections:
     def add(self, correction: NDArray[np.float64], *matrices: sparse.csr_array) -> None:
         """Remember a correction that is not zero, (n,) [K]; the oldest is forgotten."""
         if self._fields is None:
-            self._fields = np.zeros((CORRECTIONS, len(correction)))
+            self._fields = room((CORRECTIONS, len(correction)))
+            self._fields[:] = 0.0
         place = self._count % CORRECTIONS
         self._count += 1
         scaled = correction / np.abs(correction).max()

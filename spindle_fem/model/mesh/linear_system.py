@@ -23,7 +23,8 @@ class ThermalSystem:
 
     Attributes
     ----------
-    matrix : (n, n) csr_array, [W/K]
+    matrix : (n, n) csr_array or None, [W/K]
+        None where the full matrix alone is kept.
     load : (n,) ndarray, [W]
     exchange : (n, m) csc_array, [W/K]
         Coupling of unknowns with lumped nodes.
@@ -36,7 +37,7 @@ class ThermalSystem:
         From linear to quadratic temperatures, for multigrid.
     """
 
-    matrix: sparse.csr_array
+    matrix: sparse.csr_array | None
     load: NDArray[np.float64]
     exchange: sparse.csc_array
     lumped_matrix: NDArray[np.float64]

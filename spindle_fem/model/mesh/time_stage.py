@@ -11,7 +11,7 @@ from scipy import sparse
 
 from spindle_fem.errors import ConvergenceError, SpecError
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, reference_temperature
-from spindle_fem.model.mesh.equations import assemble_capacity, assemble_load
+from spindle_fem.model.mesh.equations import assemble_capacity, assemble_load, assemble_system
 from spindle_fem.model.mesh.first_guesses import RecentCorrections
 from spindle_fem.model.mesh.heat_balance import BoundaryFlows, boundary_flows
 from spindle_fem.model.mesh.huge_pages import room
@@ -358,9 +358,11 @@ class StageSolver:
             self.matrix_builds += 1
             ratio = size / kept.preconditioned_step
             if kept.preconditioner is None or kept.stale or not 1.0 / OTHER_STEP < ratio < OTHER_STEP:
-                tied = kept.tied
+                tied, matrix = kept.tied, kept.tied.matrix
+                if matrix is None:
+                    matrix = assemble_system(kept.coefficients, self._reference).matrix
                 stepped = ThermalSystem(
-                    add_scaled(self._tied_storage, factor, tied.matrix),
+                    add_scaled(self._tied_storage, factor, matrix),
                     tied.load,
                     tied.exchange * factor,
                     np.diag(self._lumped_capacity) + factor * tied.lumped_matrix,
