@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant
@@ -91,7 +93,8 @@ def exchanged(search: Search) -> None:
                         or (is_spindle and member.kind == SENSOR != c.kind)
                     ),
                 )
-    search.fit_all(tasks, reach=tuned.EXCHANGED_REACH)
+    explained = search.is_explained(search.ranked()[0])
+    search.fit_all(tasks, reach=tuned.EXCHANGED_REACH if explained else tuned.HOPELESS_SCORE)
 
 
 def _with_laws(
@@ -105,8 +108,10 @@ def _with_laws(
         search.screened(base.fit, only_laws=True)
     screened = search.screenings[identity(rest)]
     found = screened.best_of(lambda c: allowed(c) and not search.in_intervals(c), tuned.EFFECTS_EXCHANGED)
-    gains = screened.singles()
-    least = tuned.LEAST_PROMISED_SHARE * float(gains.max(initial=0.0))
+    gains, least = screened.singles(), -np.inf
+    if search.is_explained(base):
+        # What is still to be found is small, and first order says how much it gains.
+        least = tuned.LEAST_PROMISED_SHARE * float(gains.max(initial=0.0))
     return [
         search.task(base.fit, [(screened.variants[index], amplitude)], {})
         for index, amplitude in found

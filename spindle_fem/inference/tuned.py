@@ -125,7 +125,7 @@ HOPELESS_SCORE, FAIR_SHARE = 100.0, 0.55
 # Best sets that are tried without each member, and with whole bearing sets in place of single bearings.
 SETS_REDUCED = 3
 # Best sets whose members are exchanged: effects tried in place of each, and other spots for unrecorded heat.
-# An exchanged set this much less likely than the best is not followed to its optimum.
+# Where the best set fits within the errors, an exchanged one so much less likely is not followed to its end.
 SETS_EXCHANGED, EFFECTS_EXCHANGED, OTHER_SPOTS = 1, 5, 3
 EXCHANGED_REACH = 30.0
 # Rounds of leaving out and exchanging, as long as each finds a better set.
