@@ -60,6 +60,10 @@ def reported_parameters(fit: Fit, candidate: Candidate, seed: int = 0) -> dict[s
         if name in samples:
             spread = np.exp(sigma * generator.standard_normal(DRAWS))
             samples[name] = (np.array(samples[name]) * spread).tolist()
+    for name, sigma in effect.law_shift.items():
+        if name in samples:
+            moved = np.array(samples[name]) + sigma * generator.standard_normal(DRAWS)
+            samples[name] = moved.tolist()
     found = {}
     for name, item in central.items():
         ends = np.quantile(samples[name], [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])

@@ -153,6 +153,13 @@ def test_a_size_whose_place_is_unsure_has_a_wider_interval(found, monkeypatch):
     assert wide["value"] == narrow["value"]
     assert wide["low"] < narrow["low"] <= narrow["high"] < wide["high"]
     assert wide["high"] / wide["value"] > 0.85 * np.exp(1.645 * 0.45)
+    monkeypatch.setattr(type(effect_of(candidate.effect)), "law_sigma", {})
+    size = 5.0 * abs(narrow["value"])
+    monkeypatch.setattr(type(effect_of(candidate.effect)), "law_shift", {name: size})
+    shifted = reported_parameters(outcome.final, candidate)[name]
+    assert shifted["value"] == narrow["value"]
+    assert shifted["low"] < 0.0
+    assert shifted["high"] - shifted["low"] == pytest.approx(2.0 * 1.645 * size, rel=0.2)
 
 
 # ------------------------------------------------------------------------ sufficiency

@@ -226,6 +226,8 @@ class Effect(ABC):
     law_sigma : mapping of str to float
         1 σ of the logarithm of what a finding states, by name, that a fit of so simple a law cannot
         know of; widens the stated interval.
+    law_shift : mapping of str to float
+        Likewise 1 σ of what may have either sign or be nothing, in the unit that it is stated in.
     """
 
     name: str
@@ -235,6 +237,7 @@ class Effect(ABC):
     card: Card
     prior_weight: float = 1.0
     law_sigma: Mapping[str, float] = MappingProxyType({})
+    law_shift: Mapping[str, float] = MappingProxyType({})
 
     def in_definition(self, spec: MachineSpec) -> bool:
         """Whether the definition of a machine with geometry switches it on without an ``[[effect]]``."""
