@@ -76,7 +76,7 @@ BASIS_TOLERANCE = 1.0e-3
 # Factor on each contact whose states join the basis; without them loose joints were named too rarely.
 OPENED_CONTACT = 0.1
 # Operating points whose coefficients differ by less than this share use the same operators while searching:
-# a third of a per cent of a film is some millikelvins. Final fits use exact ones.
+# a third of a per cent of a film moves readings by up to 20 mK. Final fits use exact ones.
 SAME_OPERATORS_WITHIN = 3.0e-3
 
 # ------------------------------------------------------------------------------------------------- fits
