@@ -36,8 +36,6 @@ NOT_SIMULATED = (ConvergenceError, OutOfValidityError, SpecError)
 MOST_ITERATIONS = 30
 # An exact fit ends with a step that lowers the misfit by less than this share: rounding comes next.
 EXACT_SHARE = 1.0e-8
-# Share of the promised decrease from which the straight problem is trusted for longer steps.
-FAIR_STEP = 0.3
 # Largest change of any coordinate in one step, in prior deviations.
 LARGEST_MOVE = 2.0
 
@@ -306,8 +304,7 @@ class Problem:
                 if trial is not None and trial.cost < point.cost - 1e-9:
                     gain = point.cost - trial.cost
                     point = trial
-                    # Where the straight problem promised far more, the next step is no longer than this one.
-                    damping = max(damping * (0.1 if gain > FAIR_STEP * promised else 3.0), 1e-6)
+                    damping = max(damping / 10.0, 1e-6)
                     break
                 if largest < 1e-6:
                     break

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -249,7 +250,7 @@ def initial_parameters(network: ThermalNetwork, recording: Recording) -> tuple[P
             kind="initial",
             index=index,
             value=float(state[index]),
-            sigma_log=(np.hypot(sigma[name], READ_SIGMA) if name in readings else UNREAD_SIGMA)
+            sigma_log=(math.hypot(sigma[name], READ_SIGMA) if name in readings else UNREAD_SIGMA)
             / float(state[index]),
             unit="K",
         )

@@ -212,12 +212,13 @@ def test_held_out_readings_do_not_touch_the_fit_and_lie_within_the_interval(netw
     assert 0.82 < inside.mean() < 0.98
 
 
-def test_starting_temperatures_are_fitted_with_the_noise_of_their_reading(network, recording):
+def test_starting_temperatures_are_fitted_beside_their_reading_by_what_sensors_err(network, recording):
     predictor = at_stamps(network, [recording], "first_reading")
     priors = priors_of(predictor)
     starts = [prior for prior in priors if prior.name.startswith("start.")]
     assert [prior.name for prior in starts] == ["start.0.initial.winding", "start.0.initial.body"]
-    assert [prior.sigma_log * prior.value for prior in starts] == pytest.approx([0.1, 0.1], rel=1e-6)
+    spreads = [prior.sigma_log * prior.value for prior in starts]
+    assert spreads == pytest.approx([np.hypot(0.1, 1.5)] * 2, rel=1e-6)
     values, slopes = predicted(predictor, np.zeros(len(priors)))
     moved = np.zeros(len(priors))
     place = priors.index(starts[0])

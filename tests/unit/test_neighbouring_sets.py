@@ -57,6 +57,10 @@ class NotingSearch:
         """The best set first."""
         return [self.best]
 
+    def is_explained(self, hypothesis):
+        """Something is left to explain."""
+        return False
+
     def in_intervals(self, candidate):
         """Laws alone."""
         return False
@@ -65,7 +69,7 @@ class NotingSearch:
         """The set that would be fitted."""
         return (*fit.candidates, *(variant.candidate for variant, _ in additions)), {}
 
-    def fit_all(self, tasks, again=False):
+    def fit_all(self, tasks, again=False, reach=0.0):
         """Note what is asked."""
         self.asked = {identity(candidates) for candidates, _ in tasks}
 
@@ -89,7 +93,7 @@ def test_physics_anywhere_is_tried_in_the_place_of_a_sensor_that_lies(kind, trie
 @pytest.fixture
 def search(monkeypatch):
     """A search that knows one set, whose fit left 50, and keeps what is fitted as it is given."""
-    monkeypatch.setattr(Search, "_hopeless", lambda self, size: np.inf)
+    monkeypatch.setattr(Search, "_hopeless", lambda self, size, reach: np.inf)
     monkeypatch.setattr(Search, "_unseen", lambda self, candidate, values: False)
     monkeypatch.setattr(Search, "hypothesis", lambda self, fit, paid=0.0: fit)
     monkeypatch.setattr(Search, "keep", lambda self, fit: self.found.update({"kept": fit}))
