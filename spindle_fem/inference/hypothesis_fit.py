@@ -294,7 +294,7 @@ class Problem:
                     damping *= 10.0
                     continue
                 promised = float(2.0 * gradient @ move - move @ hessian @ move)
-                if 0.0 <= promised < enough:
+                if 0.0 <= promised <= enough:
                     break
                 try:
                     trial = objective.at(point.position + move, slopes.predicted_after(move))
@@ -312,7 +312,7 @@ class Problem:
                 damping *= 10.0
             # A step that was taken gains more than nothing. The last one gains so little that the derivatives
             # before it serve.
-            if gain < enough:
+            if gain <= enough:
                 break
             if iteration >= tuned.HOPELESS_AFTER and point.cost - tuned.HOPELESS_REACH * gain > hopeless:
                 break
