@@ -24,6 +24,7 @@ from spindle_fem.inference.like_sets import may_stand_for
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
 from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.other_answers import with_other_answers
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import (
     Calibrated,
@@ -356,7 +357,7 @@ def _refit(
         for fit, item in zip(workers.fits(problem, orders), chosen, strict=True)
         if fit is not None
     ]
-    fitted = [_begun_with_more(problem, h, fitted) for h in fitted]
+    fitted = with_other_answers(problem, [_begun_with_more(problem, h, fitted) for h in fitted], workers)
     return sorted(fitted, key=lambda h: -h.score)
 
 

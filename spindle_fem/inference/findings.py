@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.effect import Candidate, Reported, in_intervals
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import effect_of
-from spindle_fem.inference import tuned
 from spindle_fem.inference.calibration import LEVEL
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.other_answers import draws_of
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.verdict import Ranked
 
@@ -47,8 +47,7 @@ def reported_parameters(fit: Fit, candidate: Candidate, seed: int = 0) -> dict[s
     effect = effect_of(candidate.effect)
     central = effect.report(candidate, candidate_values(candidate, fit.values))
     generator = np.random.default_rng(seed)
-    covariance = tuned.INTERVAL_WIDENING**2 * max(fit.reduced_misfit, 1.0) * fit.covariance
-    draws = generator.multivariate_normal(fit.position, covariance, DRAWS, method="eigh")
+    draws = draws_of(fit, generator, DRAWS)
     low = np.array([c.low for c in fit.coordinates])
     high = np.array([c.high for c in fit.coordinates])
     samples: dict[str, list[float]] = {name: [] for name in central}

@@ -63,6 +63,8 @@ class Fit:
         What was known of the machine before, as a normal distribution about the optimum.
     evaluations : int
         Number of predictions.
+    others : tuple of Fit
+        Less likely answers of the same set, at which fits from other starts ended.
     """
 
     candidates: tuple[Candidate, ...]
@@ -76,6 +78,7 @@ class Fit:
     slow: SlowError
     known: Belief
     evaluations: int = 0
+    others: tuple[Fit, ...] = ()
 
     @property
     def values(self) -> dict[str, float]:

@@ -228,6 +228,9 @@ class Effect(ABC):
         know of; widens the stated interval.
     law_shift : mapping of str to float
         Likewise 1 σ of what may have either sign or be nothing, in the unit that it is stated in.
+    starts_are_answers : bool
+        Whether fits from different starts may end in answers of their own, of which a single fit knows one:
+        final fits then begin from every start.
     """
 
     name: str
@@ -238,6 +241,7 @@ class Effect(ABC):
     prior_weight: float = 1.0
     law_sigma: Mapping[str, float] = MappingProxyType({})
     law_shift: Mapping[str, float] = MappingProxyType({})
+    starts_are_answers: bool = False
 
     def in_definition(self, spec: MachineSpec) -> bool:
         """Whether the definition of a machine with geometry switches it on without an ``[[effect]]``."""
