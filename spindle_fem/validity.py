@@ -13,6 +13,8 @@ from spindle_fem.errors import OutOfValidityError
 # Ranges to unpack: ``require_range("here", length=(length, *POSITIVE))``.
 POSITIVE = (float(np.finfo(np.float64).tiny), float(np.finfo(np.float64).max))
 NOT_NEGATIVE = (0.0, float(np.finfo(np.float64).max))
+# Temperatures on and about machines, K: an open thermocouple reads above or below; no sensor does in earnest.
+PLAUSIBLE_KELVIN = (213.15, 673.15)
 
 
 @dataclass(frozen=True, slots=True)

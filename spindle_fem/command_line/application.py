@@ -45,6 +45,16 @@ def _without_values(options: list[Any]) -> list[Any]:
     return options
 
 
+def _reflowed(text: str) -> str:
+    r"""Paragraphs of a docstring for the terminal's own width, without the marks of code.
+
+    >>> _reflowed("One\nline.\n\nSee ``run\n-o DIR``.")
+    'One line.\n\nSee run -o DIR.'
+    """
+    paragraphs = (" ".join(part.split()) for part in text.replace("``", "").split("\n\n"))
+    return "\n\n".join(paragraphs)
+
+
 class _Commands(TyperGroup):
     """The commands; ``diagnose --plan`` and ``diagnose --jobs`` are commands of their own."""
 
@@ -59,11 +69,12 @@ class _Commands(TyperGroup):
         return _without_values(super().get_params(ctx))
 
     def get_command(self, ctx: typer.Context, cmd_name: str) -> Any:
-        """Command of a name; its flags, and those of its own commands, take no value."""
+        """Command of a name; its flags, and those of its own commands, take no value. Help is reflowed."""
         command = super().get_command(ctx, cmd_name)
         if command is not None:
             for each in (command, *getattr(command, "commands", {}).values()):
                 _without_values(each.get_params(ctx))
+                each.help = _reflowed(each.help or "")
         return command
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:

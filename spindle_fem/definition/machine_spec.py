@@ -299,6 +299,12 @@ class MachineSpec(SpecModel):
     effects: Annotated[tuple[EffectEntry, ...], Field(alias="effect")] = ()
     """Effects of the catalogue that are switched on."""
 
+    def __repr__(self) -> str:
+        counts = f"{len(self.part)} parts, {len(self.bearings)} bearings"
+        return f"<{type(self).__name__}: {self.name}, {counts}>"
+
+    __str__ = __repr__
+
     @model_validator(mode="after")
     def _add_streams(self) -> MachineSpec:
         """Streams through bearings are films like all others; a machine that is read again gets them once."""

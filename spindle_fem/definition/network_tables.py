@@ -217,3 +217,9 @@ class NetworkMachineSpec(SpecModel):
     """Nodes, boundaries, links and sources."""
     effects: Annotated[tuple[EffectEntry, ...], Field(alias="effect")] = ()
     """Physics that the network does not hold, switched on; see `[[effect]]` above."""
+
+    def __repr__(self) -> str:
+        nodes, links = len(self.network.node), len(self.network.link)
+        return f"<{type(self).__name__}: {self.name}, {nodes} nodes, {links} links>"
+
+    __str__ = __repr__

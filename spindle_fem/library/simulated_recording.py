@@ -15,7 +15,9 @@ from spindle_fem.library.loaded_machine import Machine, Progress, definition_fil
 from spindle_fem.recordings import align
 from spindle_fem.recordings.align import Recording
 from spindle_fem.report.read_against_predicted import simulated_courses, simulated_figure
-from spindle_fem.report.recording_picture import recording_figure
+from spindle_fem.report.recording_picture import draw_recording, recording_figure
+from spindle_fem.results.dataset import write_dataset
+from spindle_fem.results.output_folder import output_folder
 from spindle_fem.results.presented import Presented
 from spindle_fem.studies.simulate import Simulation
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -55,6 +57,20 @@ class ReadRecording(Presented, Recording):
             },
             {"name": self.name, "start": self.start or ""},
         )
+
+    def save(self, folder: str | Path) -> Path:
+        """Write :meth:`to_xarray` as ``recording.nc`` and :meth:`plot_channels` as ``recording.png``.
+
+        Raises
+        ------
+        BadInputError
+            The folder holds something else, or cannot be written.
+        """
+        data = "recording.nc"
+        with output_folder(folder, own={data}) as place:
+            write_dataset(self.to_xarray(), place / data)
+            draw_recording(place / "recording.png", self)
+        return place
 
     def plot_channels(self) -> Figure:
         """Every channel over time, with gaps and readings that are not used marked."""

@@ -15,7 +15,7 @@ from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
 from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.units import ZERO_CELSIUS_K
-from spindle_fem.validity import CodedWarning, fold_warnings
+from spindle_fem.validity import PLAUSIBLE_KELVIN, CodedWarning, fold_warnings
 
 
 def require_possible_operation(spec: MachineSpec) -> None:
@@ -24,7 +24,8 @@ def require_possible_operation(spec: MachineSpec) -> None:
     Raises
     ------
     SpecError or FaultsError
-        A speed that no rolling bearing of these diameters reaches, a coolant beyond its known properties.
+        A speed that no rolling bearing of these diameters reaches, air that no sensor on a machine reads, a
+        coolant beyond its known properties.
     """
     faults = list(_faults(spec))
     if len(faults) == 1:
@@ -95,6 +96,14 @@ def _faults(spec: MachineSpec) -> Iterator[SpecError]:
         require_possible_speeds(spec, [spec.operation.speed] if spec.operation else (), "operation.speed")
     except SpecError as fault:
         yield fault
+    low, high = PLAUSIBLE_KELVIN
+    if spec.operation and not low <= spec.operation.ambient_temperature <= high:
+        yield SpecError(
+            "operation.ambient_temperature",
+            f"{spec.operation.ambient_temperature - ZERO_CELSIUS_K:.4g} °C.",
+            f"No machine stands in air outside {low - ZERO_CELSIUS_K:.4g} to {high - ZERO_CELSIUS_K:.4g} °C; "
+            "is the unit right?",
+        )
     inlets = {}
     if spec.coolant is not None:
         inlets["coolant"] = coolant_by_name(spec.coolant.fluid), spec.coolant.inlet_temperature

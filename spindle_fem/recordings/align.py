@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import FaultsError, MissingColumnError, RecordingError, did_you_mean
 from spindle_fem.recordings.channel_checks import (
-    PLAUSIBLE_KELVIN,
     ChannelNoise,
     Flag,
     channel_noise,
@@ -34,6 +33,7 @@ from spindle_fem.recordings.manifest import (
 from spindle_fem.recordings.read_data import RawTable, read_table
 from spindle_fem.recordings.recordable_names import RecordableNames
 from spindle_fem.units import ZERO_CELSIUS_K
+from spindle_fem.validity import PLAUSIBLE_KELVIN
 
 Array = NDArray[np.float64]
 

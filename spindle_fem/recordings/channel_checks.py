@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.stats import chi2
 
+from spindle_fem.validity import PLAUSIBLE_KELVIN
+
 Array = NDArray[np.float64]
 
 
@@ -40,8 +42,6 @@ STALE_READINGS = 60
 STALE_SECONDS = 1800.0
 STALE_APPROACH = 600.0
 QUIET_SHARE = 0.25
-# An open thermocouple reads above or below this; no spindle sensor does in earnest.
-PLAUSIBLE_KELVIN = (213.15, 673.15)
 
 # The standard deviation of a normal sample cut to its 95 % smallest magnitudes is this fraction:
 # sqrt(1 - 2 z phi(z) / 0.95) at z = 1.959964.

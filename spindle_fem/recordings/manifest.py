@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +35,8 @@ ROLE_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "input": (("drives", "unit"), ("hold", "sigma")),
     "covariate": ((), ("unit", "sigma")),
 }
+# Schemas of machines, studies and results: nothing else in such a file is a fault of a manifest.
+_OF_OTHER_FILES = re.compile(r"spindle-fem/(?!recording\b)")
 _ROTATION_UNITS = ("revolution", "turn", "radian", "degree")
 
 
@@ -195,15 +198,14 @@ def load_manifest(path: str | Path, *, growing: bool = False) -> tuple[Manifest,
     file = find_manifest(path)
     content = read_toml(file)
     source = str(file)
-    schema = content.get("schema", RECORDING_SCHEMA)
-    if schema != RECORDING_SCHEMA:
-        fault = SpecError(f"{source}: schema", f"{schema!r} is not known.", f'Allowed: "{RECORDING_SCHEMA}".')
-        raise FaultsError(source, [fault])
-    faults: list[SpindleFemError] = []
+    faults = _schema_faults(content.get("schema", RECORDING_SCHEMA), source)
+    if _OF_OTHER_FILES.match(str(content.get("schema"))):
+        raise FaultsError(source, faults)
     try:
         Manifest.model_validate(content)
     except ValidationError as error:
-        faults += validation_faults(error, source, Manifest)
+        told = {fault.where for fault in faults}
+        faults += [item for item in validation_faults(error, source, Manifest) if item.where not in told]
     found = [*_contradictions(content), *_data_faults(content.get("data"), file.parent, growing)]
     faults += [type(fault)(f"{source}: {fault.where}", fault.what, fault.how_to_fix) for fault in found]
     if faults:
@@ -211,6 +213,12 @@ def load_manifest(path: str | Path, *, growing: bool = False) -> tuple[Manifest,
     manifest = Manifest.model_validate(content)
     standard = growing and manifest.data == STANDARD_INPUT
     return manifest, Path(STANDARD_INPUT) if standard else file.parent / manifest.data
+
+
+def _schema_faults(schema: Any, source: str) -> list[SpindleFemError]:
+    if schema == RECORDING_SCHEMA:
+        return []
+    return [SpecError(f"{source}: schema", f"{schema!r} is not known.", f'Allowed: "{RECORDING_SCHEMA}".')]
 
 
 def _data_faults(data: Any, folder: Path, growing: bool) -> list[SpindleFemError]:

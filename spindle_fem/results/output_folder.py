@@ -21,33 +21,27 @@ MARKER = "INCOMPLETE"
 _MOST_QUOTED = 200
 # Errors of the system that say nothing about what is read.
 _WRITING = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
-# Files that only commands of this program write; pages and figures may be anyone's, the rest the user's.
+# Files that only commands of this program write; pages, tables and figures may be anyone's. Definitions and
+# studies are left out: a user's own stands beside the data, and would be written over.
 # A drafted recording is for its user to check and edit: no results are written beside it.
 _OWN = frozenset(
     {
         "summary.json",
         "fields.vtu",
         "result.nc",
-        "machine.toml",
         "crosscheck.json",
-        "results.csv",
         "simulation.json",
         "simulated.csv",
-        "calibrated_machine.toml",
         "diagnosis.json",
         "diagnoses.json",
         "diagnoses.csv",
         "plan.json",
-        "improved_machine.toml",
         "states.csv",
         "heat.json",
         "heat.csv",
         "sweep.json",
-        "results.parquet",
-        "study.toml",
         "transient.json",
         "fields.vtkhdf",
-        "reduced_network.toml",
         "state_space.npz",
         "state_space.json",
         "simulation.nc",

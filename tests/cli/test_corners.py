@@ -43,7 +43,8 @@ def test_an_interrupted_diagnosis_leaves_the_machine_of_an_earlier_one(tmp_path,
     made_recording(tmp_path / "recording", machine)
     folder = tmp_path / "out"
     folder.mkdir()
-    (folder / "machine.toml").write_text("earlier", encoding="utf-8")
+    for name in ("machine.toml", "diagnosis.json"):
+        (folder / name).write_text("earlier", encoding="utf-8")
 
     def interrupted(*told, **settings):
         raise KeyboardInterrupt
@@ -138,11 +139,20 @@ def test_help_keeps_the_names_of_tables():
     assert "[bearing]" in shown
 
 
-def test_a_folder_with_somebody_elses_report_is_left_alone(tmp_path):
-    (tmp_path / "report.html").write_text("mine")
-    with pytest.raises(BadInputError, match=r"report\.html"), output_folder(tmp_path):
+def test_help_fills_its_lines_whatever_those_of_the_source():
+    shown = CliRunner().invoke(app, ["diagnose", "--help"], env={"COLUMNS": "80"}).output
+    assert "which effects the\n" in shown.replace(" \n", "\n")
+    assert "``" not in shown
+
+
+@pytest.mark.parametrize(
+    "name", ["report.html", "machine.toml", "study.toml", "improved_machine.toml", "results.csv"]
+)
+def test_a_folder_with_somebody_elses_file_is_left_alone(name, tmp_path):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(BadInputError, match=re.escape(name)), output_folder(tmp_path):
         pass
-    assert (tmp_path / "report.html").read_text() == "mine"
+    assert (tmp_path / name).read_text() == "mine"
 
 
 def test_a_checked_machine_tells_where_it_runs_and_what_was_drawn(command, tmp_path):
@@ -163,6 +173,7 @@ def test_an_oil_beyond_its_known_properties_is_refused(command):
     ("override", "told"),
     [
         ("operation.speed=90000rpm", "No rolling bearing of"),
+        ("operation.ambient_temperature=500degC", "No machine stands in air outside -60 to 400 °C"),
         ("coolant.inlet_temperature=120degC", "are known from"),
         ("part.shaft.material=stahl", "aluminium_alloy"),
     ],

@@ -46,6 +46,15 @@ def simulated(recording):
     return spindle_fem.simulate(spindle_fem.load_machine(EXAMPLES / "pump.toml"), recording)
 
 
+@pytest.mark.parametrize(
+    ("machine", "counts"),
+    [("small_two_start", "5 parts, 2 bearings"), (EXAMPLES / "pump.toml", "2 nodes, 2 links")],
+)
+def test_a_definition_prints_in_one_line(machine, counts):
+    spec = spindle_fem.load_machine(machine)
+    assert repr(spec) == str(spec) == f"<{type(spec).__name__}: {spec.name}, {counts}>"
+
+
 def require_shown(found, *words):
     assert len(repr(found)) < LONGEST_REPR
     assert repr(found).startswith(f"<{type(found).__name__}: ")
@@ -55,7 +64,9 @@ def require_shown(found, *words):
         assert word in page
 
 
-def test_a_recording(recording):
+def test_a_recording(recording, tmp_path):
+    place = recording.save(tmp_path / "read")
+    assert {"recording.nc", "recording.png"} <= {item.name for item in recording.save(place).iterdir()}
     require_shown(recording, "T1", "22.0 to")
     data = recording.to_xarray()
     assert data["temperature"].sel(channel="T2").values[0] == pytest.approx(22.0)

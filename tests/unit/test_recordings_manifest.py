@@ -111,9 +111,18 @@ def test_every_fault_at_once(folder):
     rewrite(folder, 'unit = "rpm"', 'unit = "rmp"')
     rewrite(folder, 'probe = "SP01"\n', "")
     rewrite(folder, 'data = "data.csv"', 'data = "nothing.csv"')
+    rewrite(folder, "recording/1", "recording/2")
     with pytest.raises(FaultsError) as caught:
         load_manifest(folder)
-    assert len(caught.value.faults) == 3
+    assert len(caught.value.faults) == 4
+
+
+def test_nothing_but_the_schema_of_another_kind_of_file_is_a_fault(folder):
+    rewrite(folder, "recording/1", "study/1")
+    rewrite(folder, 'unit = "rpm"', 'unit = "rmp"')
+    with pytest.raises(FaultsError) as caught:
+        load_manifest(folder)
+    assert places(caught) == ["schema"]
 
 
 def test_columns_and_names_of_the_machine_are_told_beside_other_faults(folder):
