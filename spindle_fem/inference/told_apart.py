@@ -54,7 +54,7 @@ def misfit_seen(freedom: int, trials: int) -> float:
 def misfit_told() -> float:
     """Squared distance (χ²) at which one effect is distinguished from another with ``POWER``.
 
-    The misfit of the other then exceeds the margin within which a diagnosis names both together.
+    The misfit of the other then exceeds the margin beyond which a diagnosis does not name both together.
     """
     width = norm.ppf(POWER)
     return float((width + np.sqrt(width**2 + tuned.NEAR_MISFIT)) ** 2)

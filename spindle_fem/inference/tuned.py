@@ -189,7 +189,9 @@ IMPROVEMENT_OF_EVENTS = 0.25
 # Probability from which the first set alone is named.
 DECIDED = 0.75
 # Sets of as many effects are named together where their readings differ by less than this share of the noise
-# in every channel (root mean square), their misfits by less than this, and evidence gives the other this.
+# in every channel (root mean square), all readings are less than LEAST_HELDOUT_GAIN for the first, and
+# evidence gives the other the third. The second, a difference of misfits, bounds what is fitted again for
+# this, and what a plan counts as told apart.
 NEAR_READINGS, NEAR_MISFIT, NEAR_PROBABILITY = 0.22, 14.0, 0.01
 # Probability from which another set is listed.
 LISTED = 0.02

@@ -307,7 +307,7 @@ def judge(
         for item in rivals
         if item.probability >= tuned.NEAR_PROBABILITY
         and may_stand_for(item.fit, chosen.fit, known_as_one)
-        and item.best.misfit < chosen.best.misfit + tuned.NEAR_MISFIT
+        and _told_by_readings(chosen.best, item.best, coarseness) < tuned.LEAST_HELDOUT_GAIN
         and apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
     ]
     evidence = alike.probability
@@ -375,6 +375,18 @@ def _predicts(
         return lower and left(chosen.fit) <= left(empty.fit)
     gain = 0.5 * (empty.heldout - chosen.heldout) / tuned.GAIN_DIVISOR
     return max(gain, gain + odds if coarseness == 1.0 else gain) >= tuned.LEAST_HELDOUT_GAIN
+
+
+def _told_by_readings(chosen: Hypothesis, other: Hypothesis, coarseness: float) -> float:
+    """Logarithm of the odds of a set over another of its size by all readings, whatever was likely before.
+
+    Held-out readings count as fitted ones do, which are three times as many; both less where the model is
+    coarse, as :func:`tempered` has it.
+    """
+    gain = other.misfit - chosen.misfit
+    if chosen.heldout is not None and other.heldout is not None:
+        gain += other.heldout - chosen.heldout
+    return 0.5 * gain / (tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness)))
 
 
 def _log_odds(item: Ranked, empty: Ranked) -> float:

@@ -314,7 +314,11 @@ def test_a_clear_single_effect_gets_the_verdict_of_its_kind(member, expected):
     assert found.alternatives == ()
 
 
-LIKE = (hypothesis(misfit=1400.0), hypothesis(PRELOAD, misfit=400.0), hypothesis(CHURNING, misfit=412.0))
+LIKE = (
+    hypothesis(misfit=1400.0),
+    hypothesis(PRELOAD, misfit=400.0),
+    hypothesis(CHURNING, misfit=408.0, log_prior=float(np.log(0.2))),
+)
 
 
 def test_sets_that_read_alike_are_named_together_however_probable_one_is():
@@ -342,9 +346,25 @@ def test_sets_that_read_apart_or_fit_apart_are_decided_by_their_likelihood():
 
     assert verdict(*LIKE, apart=apart).verdict == "missing_physics"
     assert asked == [(LIKE[1].fit, LIKE[2].fit)]
-    worse = hypothesis(CHURNING, misfit=400.0 + 1.01 * tuned.NEAR_MISFIT)
+    twenty_to_one = 2.0 * tuned.GAIN_DIVISOR_IN_A_SIZE * tuned.LEAST_HELDOUT_GAIN
+    worse = hypothesis(CHURNING, misfit=400.0 + 1.01 * twenty_to_one)
     found = verdict(*LIKE[:2], worse, apart=lambda one, other: 0.0)
-    assert (found.verdict, found.alternatives) == ("missing_physics", ())
+    assert found.verdict == "missing_physics"
+
+
+@pytest.mark.parametrize(
+    ("heldout", "expected"), [(500.0, "ambiguous"), (510.0, "missing_physics"), (490.0, "ambiguous")]
+)
+def test_held_out_readings_tell_sets_apart_that_read_alike(heldout, expected):
+    nothing, best, other = LIKE
+    found = verdict(
+        replace(nothing, heldout=900.0),
+        replace(best, heldout=500.0),
+        replace(other, heldout=heldout),
+        apart=lambda one, other: 0.0,
+    )
+    assert found.verdict == expected
+    assert found.chosen.fit is best.fit
 
 
 def test_the_same_elsewhere_in_a_set_and_sets_of_another_size_are_no_rivals():
