@@ -38,7 +38,7 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
     from spindle_fem.machine.geometry.assembly import build_assembly, require_readable_geometry
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
     from spindle_fem.operation.assembled_sets import assembled_set, require_known_friction
-    from spindle_fem.operation.operating_limits import require_possible_operation
+    from spindle_fem.operation.operating_limits import require_possible_operation, require_seated_balls
 
     overrides = tuple(overrides)
 
@@ -77,7 +77,21 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
     def can_run(spec: MachineSpec, _: Readable) -> None:
         require_possible_operation(spec)
 
-    checks = (fits_together, require_possible_operation, rubs_by_a_known_law, has_possible_effects)
+    def has_sensors_on_mounts(spec: MachineSpec) -> None:
+        if spec.displacement_sensor:
+            # Only they need to know what of a machine is its flange.
+            from spindle_fem.machine.view.part_roles import Layout, require_mounts
+
+            require_mounts(Layout(spec, set()))
+
+    checks = (
+        fits_together,
+        require_possible_operation,
+        require_seated_balls,
+        has_sensors_on_mounts,
+        rubs_by_a_known_law,
+        has_possible_effects,
+    )
     return load_machine(machine, overrides, checks=checks, partly=(require_readable_geometry, can_run))
 
 

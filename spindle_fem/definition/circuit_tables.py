@@ -44,9 +44,9 @@ class CircuitFilm(StreamFilm):
     Bores and annuli are drawn as they are. Grooves around a sleeve and rows of bores are not: a plain
     cylinder of the part, beside a void, stands for them and gives their heat. The walls need no
     ``[[surface]]``: cells along the flow name them ``NAME.1``, ``NAME.2`` and so on from the inlet
-    (``NAME.inner.1``, ``NAME.outer.1`` of an annulus). Cells of ring grooves and of bores with several passes
-    are side by side, each with its share of the flow. Properties are those of the inlet. A
-    recording gives the inlet temperature as the input ``inlet.NAME``.
+    (``NAME.inner.1``, ``NAME.outer.1`` of an annulus, ``NAME.cover.1`` where a part covers grooves). Cells of
+    ring grooves and of bores with several passes are side by side, each with its share of the flow.
+    Properties are those of the inlet. A recording gives the inlet temperature as the input ``inlet.NAME``.
     """
 
     kind: Literal["circuit"]
@@ -58,7 +58,8 @@ class CircuitFilm(StreamFilm):
     part: Name
     """The part whose wall it wets: around a bore, inside an annulus, with the grooves or bores in it."""
     outer_part: Name | None = None
-    """The part around an annulus; ``part`` itself where none is given."""
+    """The part around an annulus, ``part`` itself where none is given; the part that covers grooves, at their
+    depth from the floor, whose wall is dry where none is given."""
     diameter: PositiveLength
     """Diameter of the wall as drawn: of the bore, inside an annulus, of the floor of grooves, or of what
     stands for a row of axial bores."""
@@ -123,7 +124,7 @@ class CircuitFilm(StreamFilm):
                 takers = [f'"{name}"' for name, keys in _MEASURES.items() if key in (*keys[0], *keys[1])]
                 yield Fault(key, "is given.", f"Only duct = {', '.join(takers)} takes it.")
         grooves = self.number * (self.turns or 1.0) * (self.width or 0.0)
-        if self.duct in ("ring_grooves", "helical_groove") and grooves > self.length:
+        if self.duct in _GROOVES and grooves > self.length:
             what = f"{1e3 * grooves:g} mm of grooves do not fit into {1e3 * self.length:g} mm of z."
             yield Fault("width", what, "Give fewer or narrower grooves.")
         if self.number % self.passes:
@@ -146,7 +147,14 @@ class CircuitFilm(StreamFilm):
         numbers = range(1, self.cells + 1)
         if self.duct == "annulus":
             return tuple((f"{self.name}.inner.{n}", f"{self.name}.outer.{n}") for n in numbers)
+        if self.is_covered:
+            return tuple((f"{self.name}.{n}", f"{self.name}.cover.{n}") for n in numbers)
         return tuple((f"{self.name}.{n}",) for n in numbers)
+
+    @property
+    def is_covered(self) -> bool:
+        """Grooves whose cover is a wall too."""
+        return self.duct in _GROOVES and self.outer_part is not None
 
     @property
     def walls(self) -> tuple[Surface, ...]:
@@ -156,9 +164,11 @@ class CircuitFilm(StreamFilm):
         ends = list(pairwise(edges))
         if self.flows_to == "front":
             ends.reverse()
-        grooved = self.duct in ("ring_grooves", "helical_groove")
-        wall = self.wall or ("outside" if grooved else "inside")
-        sides = [(self.part, "outward" if wall == "outside" else "inward", self.diameter)]
+        outside = (self.wall or ("outside" if self.duct in _GROOVES else "inside")) == "outside"
+        sides = [(self.part, "outward" if outside else "inward", self.diameter)]
+        if self.is_covered:
+            depth = 2.0 * self.depth if outside else -2.0 * self.depth
+            sides.append((self.outer_part, "inward" if outside else "outward", self.diameter + depth))
         if self.duct == "annulus":
             sides = [(self.part, "outward", self.diameter)]
             sides.append((self.outer_part or self.part, "inward", self.outer_diameter))
@@ -204,12 +214,13 @@ class WettedFilm(StreamFilm):
         return (self.surface_names,)
 
 
+_GROOVES = ("ring_grooves", "helical_groove")
 # Measures that a duct needs, and may have beside.
 _MEASURES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "bore": ((), ()),
     "annulus": (("outer_diameter",), ("outer_part",)),
-    "ring_grooves": (("width", "depth"), ("number", "wall")),
-    "helical_groove": (("width", "depth", "turns"), ("number", "wall")),
+    "ring_grooves": (("width", "depth"), ("number", "wall", "outer_part")),
+    "helical_groove": (("width", "depth", "turns"), ("number", "wall", "outer_part")),
     "axial_bores": (("bore_diameter",), ("number", "passes", "wall")),
 }
 _ONLY_SOME = tuple(dict.fromkeys(key for keys in _MEASURES.values() for key in (*keys[0], *keys[1])))

@@ -53,6 +53,6 @@ class DisplacementSensor(SpecModel):
     mount: Annotated[
         Annotated[Name, Tag("name")] | Annotated[MountSpot, Tag("spot")], Discriminator(_named_or_spot)
     ] = "flange"
-    """What holds the sensor: the housing's segment that is its flange, or ``frame``, a stand on what the
-    flange is bolted to (both count from that plane); a surface of a standing part, one plane or cylinder, or
-    a spot on it, which the holder follows without turning."""
+    """What holds the sensor: the housing's segment that is its flange (the widest, by at least a tenth), or
+    ``frame``, a stand on what the flange is bolted to (both count from that plane); a surface of a standing
+    part, one plane or cylinder, or a spot on it, which the holder follows without turning."""

@@ -52,7 +52,7 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet |
         ),
         # Springs on bearings that all face one way are a load on them.
         preload=0.0 if group.spring_force else group.preload,
-        assembled_force=abs(group.spring_force),
+        assembled_force=_force_on_tandem(spec, group),
         preload_kind="spring" if group.preload_kind == "spring" else "rigid",
         loop_stiffness=_loop_stiffness(spec, group),
         shaft_expansion=_seat_expansion(spec, group, "inner"),
@@ -64,6 +64,13 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet |
     if group.fit is not None:
         _require_holding(group, mounted)
     return mounted
+
+
+def _force_on_tandem(spec: MachineSpec, group: BearingSet) -> float:
+    """What seats bearings that all face one way, N: springs, its own or another set's, or else the thrust."""
+    if not group.faces_one_way:
+        return 0.0
+    return abs(spec.axial_load(group, 0.0) or spec.axial_load(group, spec.operation.thrust))
 
 
 def _loop_stiffness(spec: MachineSpec, group: BearingSet) -> float | None:

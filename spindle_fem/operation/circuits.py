@@ -110,6 +110,7 @@ def duct_flow(film: CircuitFilm, speed: float = 0.0) -> DuctFlow:
         passes=film.passes,
         turns=film.turns,
         bore_diameter=film.bore_diameter,
+        covered=film.is_covered,
     )
     coolant = stream_fluid(film)
     section = DUCT_KINDS[film.duct](shape)

@@ -11,6 +11,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.errors import FaultsError, SpecError
 from spindle_fem.operation.circuits import stream_fluid
+from spindle_fem.operation.radial_loads import radial_loads
 from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
 from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.coolant.properties import coolant_by_name
@@ -45,6 +46,31 @@ def require_possible_speeds(spec: MachineSpec, speeds: Iterable[float], where: s
         reason = too_fast(spec, speed)
         if reason is not None:
             raise SpecError(where, f"{speed * 30.0 / math.pi:.0f} rpm.", reason)
+
+
+def require_seated_balls(spec: MachineSpec) -> None:
+    """Refuse ball bearings that all face one way and that nothing presses on as the machine turns.
+
+    Raises
+    ------
+    SpecError
+    """
+    if spec.heat is None or spec.heat.model == "table" or not spec.operation.speed:
+        return
+    across = radial_loads(spec)
+    for group in spec.bearing_set:
+        if not group.faces_one_way:
+            continue
+        takes = group.bearing[0].takes_thrust
+        force = spec.axial_load(group, spec.operation.thrust)
+        if across[group.name] == 0.0 and not (force if takes == "towards_rear" else -force) > 0.0:
+            raise SpecError(
+                f"bearing_set.{group.name}.preload",
+                f'its bearings all take thrust "{takes}", and nothing presses them on: thrust and springs '
+                f"of other sets leave {force:g} N.",
+                "Allowed: bearings of both directions with a preload, or the springs of a set that faces the "
+                'other way (preload_kind = "spring").',
+            )
 
 
 def lost_to_air(spec: MachineSpec) -> tuple[CodedWarning, ...]:

@@ -176,8 +176,15 @@ def test_interference_closes_and_load_opens_the_contact_angle() -> None:
     assert slope == pytest.approx(0.5 * 8e-6 * 0.8, rel=0.25)
     state = mounted_state(BEARING, FITS, 568.6)
     assert 30 * state.ball_load * math.sin(state.contact_angle) == pytest.approx(568.6)
-    with pytest.raises(SpecError, match="needs a force above 0"):
-        mounted_state(BEARING, FITS, 0.0)
+    # Unloaded balls just touch: the fits alone set the angle.
+    free = mounted_state(BEARING, FITS, 0.0)
+    assert free.ball_load == 0.0
+    radial = BEARING.curvature_centre_distance * (
+        math.cos(free.contact_angle) - math.cos(BEARING.contact_angle)
+    )
+    assert radial == pytest.approx(seated_rings(BEARING, FITS).law(FitTemperatures()).growth(0.0), rel=1e-9)
+    with pytest.raises(SpecError, match="must not be negative"):
+        mounted_state(BEARING, FITS, -1.0)
 
 
 def test_set_keeps_its_preload_at_assembly_whatever_the_fits() -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from spindle_fem.commands.machine_commands import check_machine
 from spindle_fem.definition.load import load_machine
-from spindle_fem.errors import BadInputError, SpecError
+from spindle_fem.errors import BadInputError, FaultsError, SpecError
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.view.part_roles import Layout
@@ -214,3 +215,15 @@ def test_a_mount_that_is_no_flange_is_refused(grown, tmp_path) -> None:
     spec = machine(tmp_path, AXIAL | {"mount": other})
     with pytest.raises(SpecError, match="is not the flange of the housing"):
         GrowthModel(spec, grown[1], 1)
+
+
+def test_check_finds_a_sensor_on_a_flange_that_is_none(tmp_path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(
+        'schema = "spindle-fem/machine/1"\nbase = "router_spindle"\nname = "own"\n'
+        'displacement_sensor = [{name = "nose", at = {z = "0 mm", radius = "15 mm"}, direction = "axial", '
+        'mount = "frame"}]\n',
+        encoding="utf-8",
+    )
+    with pytest.raises(FaultsError, match=r"nose\.mount: the housing has no flange: no segment is 1\.1"):
+        check_machine(file)

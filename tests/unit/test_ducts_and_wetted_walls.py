@@ -75,6 +75,20 @@ def test_ring_grooves_by_hand():
     assert answer.pressure_drop > 1.5 * 0.5 * 998.0 * flow.velocity**2
 
 
+def test_a_cover_takes_its_width_and_half_of_the_sides():
+    covered, bare = film_of(RINGS | {"outer_part": "housing"}), film_of(RINGS)
+    assert covered.cell_surfaces[1] == ("jacket.2", "jacket.cover.2")
+    floor, cover = covered.walls[:2]
+    assert (floor.part, cover.part, cover.where[0].facing) == ("sleeve", "housing", "inward")
+    assert cover.where[0].r[0] == pytest.approx(54e-3)
+    inside = film_of(RINGS | {"outer_part": "tube", "wall": "inside"}).walls[1].where[0]
+    assert (inside.facing, inside.r[0]) == ("outward", pytest.approx(46e-3))
+    coefficients = [stream_answer(film, 0.0).coefficient for film in (covered, bare)]
+    assert coefficients[0] / coefficients[1] == pytest.approx((6.0 + 4.0) / (6.0 + 2 * 4.0), rel=1e-12)
+    given, taken, _ = balance(covered, [310.0, 305.0] * 4)
+    assert given == pytest.approx(taken, rel=1e-12)
+
+
 def test_cells_of_ring_grooves_are_side_by_side():
     film = film_of(RINGS)
     given, taken, bulk = balance(film, [310.0, 300.0, 300.0, 310.0])

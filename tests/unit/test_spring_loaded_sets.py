@@ -121,3 +121,24 @@ def test_springs_keep_the_load_of_balls_that_fly_outwards():
     spec = load_machine("motor_spindle", [*TANDEM, "operation.speed=18000 rpm", "operation.thrust=0 N"])
     codes = {name: {note.code for note in state.warnings} for name, state in states(spec).items()}
     assert "counter_bearing_unloaded" not in codes["R1"] | codes["R2"]
+
+
+FACING = ("bearing_set.front.bearing.F2.takes_thrust=towards_rear", "bearing_set.front.preload=0 N")
+
+
+def test_springs_of_the_rear_seat_the_rings_of_a_front_pair_in_tandem():
+    spec = fitted(*TANDEM, *FACING, "operation.thrust=0 N")
+    mechanics = BearingMechanics(spec, build_machine_network(spec).growth.seats)
+    assert mechanics.sets["front"].assembled_force == mechanics.sets["rear"].assembled_force == 200.0
+    assert mechanics.assembled_seats()["F1"][0][0] > 0.0
+    assert states(spec)["F1"].axial_force == pytest.approx(100.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(("thrust", "sound"), [("0 N", False), ("-50 N", False), ("50 N", True)])
+def test_check_refuses_a_shaft_that_nothing_holds(thrust, sound):
+    changes = [*FACING, f"operation.thrust={thrust}"]
+    if sound:
+        check_machine("motor_spindle", overrides=changes)
+        return
+    with pytest.raises(FaultsError, match=r"bearing_set\.front\.preload: .*nothing presses them on"):
+        check_machine("motor_spindle", overrides=changes)

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from spindle_fem.definition.displacement_tables import FRAME
 from spindle_fem.definition.exchange_tables import Gap
 from spindle_fem.definition.machine_spec import AnnulusSegment, MachineSpec, Part, Probe, Surface
+from spindle_fem.errors import SpecError
 
 # A segment is a flange where its diameter passes the next largest by this share.
 FLANGE_STEP = 1.1
@@ -204,3 +206,25 @@ def segment_volume(segment: AnnulusSegment) -> float:
     """Volume of an annulus, m³."""
     area = 0.25 * np.pi * (segment.outer_diameter**2 - segment.inner_diameter**2)
     return float(area * (segment.z[1] - segment.z[0]))
+
+
+def require_mounts(layout: Layout) -> None:
+    """Refuse displacement sensors on a flange where there is none, or on a segment that is no flange.
+
+    Raises
+    ------
+    SpecError
+    """
+    surfaces = {surface.name for surface in layout.spec.surface}
+    for sensor in layout.spec.displacement_sensor:
+        if not isinstance(sensor.mount, str) or sensor.mount in surfaces:
+            continue
+        if not layout.flange or sensor.mount not in (layout.flange, FRAME):
+            named = f"{layout.flange}, {FRAME}, " if layout.flange else ""
+            raise SpecError(
+                f"displacement_sensor.{sensor.name}.mount",
+                f'"{sensor.mount}" is not the flange of the housing.'
+                if layout.flange
+                else f"the housing has no flange: no segment is {FLANGE_STEP:g} times as wide as all others.",
+                f"Allowed: {named}a surface of a standing part, or z and radius of a spot on it.",
+            )

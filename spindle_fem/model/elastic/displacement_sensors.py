@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.displacement_tables import FRAME, DisplacementSensor
+from spindle_fem.definition.displacement_tables import DisplacementSensor
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import SpecError
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
-from spindle_fem.machine.view.part_roles import Layout
+from spindle_fem.machine.view.part_roles import Layout, require_mounts
 from spindle_fem.model.elastic.elastic_body import ElasticBody, Face
 
 Array = NDArray[np.float64]
@@ -75,6 +75,7 @@ def sensor_sights(spec: MachineSpec, mesh: TaggedMesh, housing: ElasticBody) -> 
         flange whose sensor hangs on it.
     """
     layout = Layout(spec, set())
+    require_mounts(layout)
     return tuple(_sight(sensor, layout, mesh, housing) for sensor in spec.displacement_sensor)
 
 
@@ -92,15 +93,6 @@ def _mount(sensor: DisplacementSensor, layout: Layout, mesh: TaggedMesh, housing
                 "Give z and radius of the spot on it to which the sensor is fixed.",
             )
         return Face(*bounds)
-    if layout.flange_ends() is None or sensor.mount not in (layout.flange, FRAME):
-        named = f"{layout.flange}, {FRAME}, " if layout.flange else ""
-        raise SpecError(
-            where,
-            f'"{sensor.mount}" is not the flange of the housing.'
-            if layout.flange
-            else "the housing has no flange.",
-            f"Allowed: {named}a surface of a standing part, or z and radius of a spot on it.",
-        )
     return None
 
 

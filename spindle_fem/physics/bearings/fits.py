@@ -332,7 +332,7 @@ def mounted_state(geometry: BearingGeometry, fits: RingFits, axial_force: float)
     Raises
     ------
     SpecError
-        A force that is not above 0.
+        A negative force.
     GeometryError
     """
     _require_force(axial_force)
@@ -387,10 +387,8 @@ def mounted_states(
 
 
 def _require_force(axial_force: float) -> None:
-    if not axial_force > 0.0:
-        raise SpecError(
-            "axial force", f"it is {axial_force:g} N.", "A mounted bearing needs a force above 0."
-        )
+    if not axial_force >= 0.0:
+        raise SpecError("axial force", f"it is {axial_force:g} N.", "It must not be negative.")
 
 
 def _lengths(geometry: BearingGeometry, axial_force: float, angle: float) -> tuple[float, float]:

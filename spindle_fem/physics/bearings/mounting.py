@@ -66,8 +66,8 @@ class BearingSet:
         Rigid (locknut) keeps the displacement of the rings; a spring on the
         outer rings of the bearings with orientation -1 keeps the force.
     assembled_force : float, [N]
-        Of springs through bearings that all face one way, which is a load on them and no preload: what
-        seats their rings at assembly.
+        Of springs, of this set or another, through bearings that all face one way, which is a load on them
+        and no preload: what seats their rings at assembly.
     loop_stiffness : float or None, [N/m]
         Of shaft, housing and spacers between the two sides of a rigid set: how they give way to its force
         beyond that of assembly. None: not at all.

@@ -35,6 +35,8 @@ class DuctShape:
         Of a helix.
     bore_diameter : float or None, [m]
         Of an axial bore.
+    covered : bool
+        The cover of grooves is a drawn wall too.
     """
 
     diameter: float
@@ -46,6 +48,15 @@ class DuctShape:
     passes: int = 1
     turns: float | None = None
     bore_diameter: float | None = None
+    covered: bool = False
+
+    @property
+    def groove_wall(self) -> float:
+        """Wetted width that a groove's floor stands for, m; with sides, half of which a cover takes.
+
+        Lands that touch the cover conduct the heat of their sides to both.
+        """
+        return self.width + (1.0 if self.covered else 2.0) * self.depth
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +76,7 @@ class DuctSection:
     path_length : float or None, [m]
         Of each; that of the drawn wall where None.
     wetted_ratio : float, [-]
-        Wetted surface that the drawn walls stand for, over theirs.
+        Wetted surface that the drawn walls stand for, over theirs; the same of floor and cover.
     turn_loss : float, [-]
         Loss coefficients of the turns of a path, together.
     helix : ChannelSection or None

@@ -10,7 +10,7 @@ from spindle_fem.physics.coolant.rectangular_duct import laminar_numbers, requir
 
 @DUCT_KINDS.register
 def helical_groove(shape: DuctShape) -> DuctSection:
-    """Floor and sides of the groove give their heat at the drawn floor; the cover counts as no wall.
+    """Floor and sides of the groove give their heat at the drawn floor, and at the cover where one is drawn.
 
     >>> section = helical_groove(DuctShape(0.1, 0.06, width=8e-3, depth=5e-3, turns=5.0))
     >>> round(section.path_length, 3), round(section.wetted_ratio, 2)
@@ -27,6 +27,6 @@ def helical_groove(shape: DuctShape) -> DuctSection:
         laminar_friction=friction,
         paths=shape.number,
         path_length=helix.length,
-        wetted_ratio=shape.number * shape.turns * (shape.width + 2.0 * shape.depth) / shape.length,
+        wetted_ratio=shape.number * shape.turns * shape.groove_wall / shape.length,
         helix=helix,
     )

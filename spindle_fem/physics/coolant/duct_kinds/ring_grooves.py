@@ -13,8 +13,8 @@ from spindle_fem.physics.coolant.rectangular_duct import laminar_numbers, requir
 def ring_grooves(shape: DuctShape) -> DuctSection:
     """Half a ring of each groove is a path; floor and sides give their heat at the drawn floor.
 
-    The cover counts as no wall, sides count in full (true of grooves in metal that are not deeper than wide).
-    Entry and exit of a ring count as 1.5 velocity heads.
+    And at the cover, where one is drawn. Sides count in full (true of grooves in metal that are not deeper
+    than wide). Entry and exit of a ring count as 1.5 velocity heads.
 
     >>> section = ring_grooves(DuctShape(0.1, 0.06, width=6e-3, depth=4e-3, number=5))
     >>> section.paths, round(section.path_length, 4), round(section.wetted_ratio, 3)
@@ -29,6 +29,6 @@ def ring_grooves(shape: DuctShape) -> DuctSection:
         laminar_friction=friction,
         paths=2 * shape.number,
         path_length=0.5 * math.pi * (shape.diameter + shape.depth),
-        wetted_ratio=shape.number * (shape.width + 2.0 * shape.depth) / shape.length,
+        wetted_ratio=shape.number * shape.groove_wall / shape.length,
         turn_loss=1.5,
     )
