@@ -70,7 +70,8 @@ def _force_on_tandem(spec: MachineSpec, group: BearingSet) -> float:
     """What seats bearings that all face one way, N: springs, its own or another set's, or else the thrust."""
     if not group.faces_one_way:
         return 0.0
-    return abs(spec.axial_load(group, 0.0) or spec.axial_load(group, spec.operation.thrust))
+    thrust = spec.operation.thrust if spec.operation else 0.0
+    return abs(spec.axial_load(group, 0.0) or spec.axial_load(group, thrust))
 
 
 def _loop_stiffness(spec: MachineSpec, group: BearingSet) -> float | None:

@@ -55,7 +55,8 @@ def require_seated_balls(spec: MachineSpec) -> None:
     ------
     SpecError
     """
-    if spec.heat is None or spec.heat.model == "table" or not spec.operation.speed:
+    # A definition with other faults may lack tables.
+    if spec.heat is None or spec.heat.model == "table" or spec.operation is None or not spec.operation.speed:
         return
     across = radial_loads(spec)
     for group in spec.bearing_set:
