@@ -13,7 +13,10 @@ from spindle_fem.recordings.numbers_in_text import numbers_of
 _DATE = r"(?P<a>\d{1,4})(?P<sign>[-./])(?P<b>\d{1,2})[-./](?P<c>\d{1,4})"
 _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<part>\d{1,9}))?)?"
 _HALF = r"\s*(?P<half>[AaPp][Mm])?"
-_ZONE = r"\s*(?P<zone>Z|UTC|[+-]\d{2}:?\d{2})?"
+# Zones by the letters that stand behind stamps, of those that mean one only.
+_ZONES = {"Z": "+0000", "UTC": "+0000", "GMT": "+0000", "CET": "+0100", "MEZ": "+0100", "CEST": "+0200"}
+_ZONES |= {"MESZ": "+0200", "EET": "+0200", "EEST": "+0300", "EST": "-0500", "EDT": "-0400"}
+_ZONE = rf"\s*(?P<zone>{'|'.join(_ZONES)}|[+-]\d{{2}}(?::?\d{{2}})?)?"
 _FORM = rf"^\s*(?:{_DATE})?[T ,;]*(?:{_CLOCK})?{_HALF}{_ZONE}\s*$"
 # Dates that leave no doubt which number is the month: English months, or ISO 8601 without signs between.
 _IN_WORDS = r"(?i)(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec).*:|^\d{8}T\d{4}"
@@ -209,7 +212,7 @@ def _year_month_day(
 
 
 def _shift_of_zone(zones: pd.Series) -> pd.Series:
-    text = zones.fillna("Z").replace({"Z": "+0000", "UTC": "+0000"}).str.replace(":", "")
+    text = zones.fillna("Z").replace(_ZONES).str.replace(":", "").str.ljust(5, "0")
     minutes = text.str[1:3].astype(int) * 60 + text.str[3:5].astype(int)
     return pd.to_timedelta(minutes.where(text.str[0] == "+", -minutes), unit="min")
 

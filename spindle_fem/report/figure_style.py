@@ -24,6 +24,7 @@ from spindle_fem.results.output_folder import whole_file
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.text import Text
     from PIL.Image import Image
 
 DPI = 160
@@ -219,11 +220,32 @@ def pixel_axes(figure: Figure, left: float, top: float, width: float, height: fl
 
 
 def set_title(figure: Figure, title: str, notes: str = "") -> None:
-    """Title in the upper left corner, with a line of notes under it; both lie in the first 82 pixels."""
+    """Title in the upper left corner, with a line of notes under it; both lie in the first 82 pixels.
+
+    What is wider than the figure is set smaller, to two thirds, and shortened where that does not suffice.
+    """
     width, height = figure.get_size_inches() * DPI
-    figure.text(24.0 / width, 1.0 - 34.0 / height, title, fontsize=12.5, fontweight="bold", va="center")
+    lines = [
+        figure.text(24.0 / width, 1.0 - 34.0 / height, title, fontsize=12.5, fontweight="bold", va="center")
+    ]
     if notes:
-        figure.text(24.0 / width, 1.0 - 66.0 / height, notes, fontsize=9.0, color=MUTED, va="center")
+        lines.append(
+            figure.text(24.0 / width, 1.0 - 66.0 / height, notes, fontsize=9.0, color=MUTED, va="center")
+        )
+    for line in lines:
+        _fit(line, (width - 48.0) / DPI * figure.dpi)
+
+
+def _fit(line: Text, room: float) -> None:
+    """Set a line of text smaller, or shorten it, until it is no wider than some pixels."""
+    share = room / max(line.get_window_extent().width, 1.0)
+    if share >= 1.0:
+        return
+    line.set_fontsize(line.get_fontsize() * max(share, 2.0 / 3.0))
+    text = line.get_text()
+    while line.get_window_extent().width > room and text:
+        text = text[: int(0.97 * len(text))].rstrip()
+        line.set_text(f"{text} …")
 
 
 def draw_colour_bar(axes: Axes, bar: ColourBar) -> None:

@@ -128,6 +128,15 @@ def test_a_clock_without_dates_passes_midnight(tmp_path):
     assert any("no date" in text for text in drafted.unsure)
 
 
+@pytest.mark.parametrize(
+    ("zone", "hour"), [(" CET", 6), (" MESZ", 5), ("+02", 5), (" -0500", 12), (" GMT", 7)]
+)
+def test_stamps_may_name_their_zone(tmp_path, zone, hour):
+    rows = "".join(f"2016-02-05 07:00:{i:02d}{zone},{20 + 0.1 * i:.1f},3000\n" for i in range(20))
+    drafted = draft(tmp_path, f"time,SP01 (degC),speed (rpm)\n{rows}")
+    assert drafted.data["time"].iloc[0] == pd.Timestamp(2016, 2, 5, hour)
+
+
 def test_zone_resolves_the_end_of_summer_time(tmp_path):
     clock = pd.date_range("2016-10-30 00:30", periods=6, freq="30min", tz="UTC").tz_convert("Europe/Berlin")
     text = "\n".join(["time,SP01", *(f"{stamp:%Y-%m-%d %H:%M:%S},{20 + i}" for i, stamp in enumerate(clock))])

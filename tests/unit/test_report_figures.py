@@ -23,7 +23,7 @@ from spindle_fem.report.crosscheck_charts import convergence_chart, speed_chart
 from spindle_fem.report.definition_tables import customary, input_groups
 from spindle_fem.report.diagnosis_drawing import DOUBTED, located_on_machine
 from spindle_fem.report.diagnosis_odds import machine_parameters
-from spindle_fem.report.figure_style import TEMPERATURE_MAP, new_figure, rasterise, scale_of
+from spindle_fem.report.figure_style import TEMPERATURE_MAP, new_figure, rasterise, scale_of, set_title
 from spindle_fem.report.heat_charts import CHARTS
 from spindle_fem.report.leader_labels import spread
 from spindle_fem.report.machine_drawing import channel_sections, machine_drawing, part_colours
@@ -425,3 +425,15 @@ def test_the_place_is_framed_and_doubted_sensors_are_red():
     assert red == [probe]
     shown = " ".join(item.get_text() for item in texts_of(figure))
     assert "where the diagnosis puts it (housing). Red names: sensors that it doubts." in shown
+
+
+@pytest.mark.parametrize("notes", ["Short.", "Notes of 150 characters " * 6, "Notes of 600 characters " * 24])
+def test_title_and_notes_stay_within_the_figure(notes):
+    figure = new_figure(400.0)
+    set_title(figure, "A long name of a machine " * 6, notes)
+    for line in figure.texts:
+        assert line.get_window_extent().x1 <= 1600.0 - 20.0
+        assert line.get_fontsize() >= 6.0
+    title, below = figure.texts
+    assert below.get_text().endswith(" …") == (len(notes) > 500)
+    assert title.get_window_extent().y0 >= below.get_window_extent().y1
