@@ -11,7 +11,7 @@ from scripts.definition_page import options
 from spindle_fem.correlation import Correlation
 from spindle_fem.definition.bearing_types import has_rollers
 from spindle_fem.definition.exchange_tables import Coolant as CoolantTable
-from spindle_fem.errors import OutOfValidityError
+from spindle_fem.errors import OutOfValidityError, SpecError
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
 from spindle_fem.physics.bearings.bearing_set import solve_bearing
@@ -23,6 +23,7 @@ from spindle_fem.physics.bearings.roller_bearing import RollerGeometry
 from spindle_fem.physics.bearings.roller_set import RollerSet, solve_roller_set
 from spindle_fem.physics.coolant.channel_section import ChannelSection
 from spindle_fem.physics.coolant.coolants import COOLANTS
+from spindle_fem.physics.coolant.film_correlation import nusselt_correlation
 from spindle_fem.physics.coolant.film_models import FILM_MODELS
 from spindle_fem.physics.coolant.regimes import ChannelState, select_film
 from spindle_fem.physics.surroundings.air_gaps import AirGap
@@ -195,3 +196,11 @@ def test_a_function_of_a_program_takes_its_own_name(monkeypatch):
     assert things.summary("wide") == "Wide gap."
     with pytest.raises(OutOfValidityError, match='Did you mean "wide"'):
         things["wode"]
+
+
+def test_a_film_correlation_that_asks_for_what_is_no_group_is_refused_at_once():
+    def nusselt(dean, prandl):
+        return dean * prandl
+
+    with pytest.raises(SpecError, match=r'nusselt: "prandl" is no group of the flow. Did you mean "prandtl"'):
+        nusselt_correlation(source="nobody", regime="laminar")(nusselt)

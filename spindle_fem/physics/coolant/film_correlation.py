@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.correlation import Array, Correlation, Range
+from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.validity import range_fault
 
 Regime = Literal["laminar", "turbulent"]
@@ -58,6 +59,10 @@ class FlowGroups:
     def only(self, names: tuple[str, ...]) -> dict[str, Any]:
         """Some of the groups by name."""
         return {name: getattr(self, name) for name in names}
+
+
+# What a correlation may ask for.
+GROUPS = (*(item.name for item in fields(FlowGroups)), "dean")
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +131,10 @@ class NusseltCorrelation(Correlation):
 
     def __init__(self, function: Callable[..., Array], ranges: Mapping[str, Range], **facts: Any) -> None:
         super().__init__(function, ranges, HOW_TO_FIX, facts.get("derived"))
+        for name in self.quantities:
+            if name not in GROUPS:
+                what = f'"{name}" is no group of the flow.'
+                raise SpecError(f"film correlation {self.name}", what, did_you_mean(name, GROUPS))
         self.source: str = facts["source"]
         self.regime: Regime = facts["regime"]
         self.counts: bool = facts.get("counts", False)
@@ -161,7 +170,9 @@ def nusselt_correlation(
     derived: Callable[..., Mapping[str, Array]] | None = None,
     **ranges: Range,
 ) -> Callable[[Callable[..., Array]], NusseltCorrelation]:
-    """Make a Nusselt number of groups of :class:`FlowGroups` a correlation of a regime.
+    """Make a function of groups of the flow, a Nusselt number, a correlation of a regime.
+
+    The function names what it asks for of :class:`FlowGroups`: ``def nusselt(dean, prandtl)``.
 
     Parameters
     ----------
@@ -172,6 +183,11 @@ def nusselt_correlation(
         As :class:`NusseltCorrelation` and :class:`spindle_fem.correlation.Correlation` have them.
     **ranges : (float, float)
         Range of the source by quantity.
+
+    Raises
+    ------
+    SpecError
+        The function asks for what is no group of the flow.
     """
     facts = {"source": source, "regime": regime, "counts": counts, "derived": derived}
     return lambda function: NusseltCorrelation(function, ranges, **facts)
