@@ -38,15 +38,43 @@ def other_starts(fit: Fit) -> list[Mapping[str, float]]:
 
 
 def with_other_answers(problem: Problem, fitted: Sequence[Hypothesis], workers: Workers) -> list[Hypothesis]:
-    """Fitted sets at the most probable answer of each, with their other ones; sets far behind unchanged."""
-    negligible = tuned.NEGLIGIBLE_SCORE
-    far = max(h.score for h in fitted) - negligible
-    tasks = []
-    for index, h in enumerate(fitted):
-        hopeless = h.fit.misfit_with_prior + 2.0 * negligible
-        for start in other_starts(h.fit) if h.score > far else ():
-            begun = h.fit.values | dict(start)
-            tasks.append((index, FitOrder(h.fit.candidates, begun, tuned.START_SHARES, hopeless)))
+    """Fitted sets at the most probable answer of each, with their other ones; sets far behind unchanged.
+
+    A set that holds a likelier one begins again only where that one has moved to another answer.
+    """
+    far = max(h.score for h in fitted) - tuned.NEGLIGIBLE_SCORE
+    starts = [other_starts(h.fit) if h.score > far else [] for h in fitted]
+    parts = [
+        [i for i, o in enumerate(fitted) if own and starts[i] and o.keys < h.keys and o.score > h.score]
+        for h, own in zip(fitted, starts, strict=True)
+    ]
+    first = [[] if held else own for own, held in zip(starts, parts, strict=True)]
+    found = _from_starts(problem, fitted, first, workers)
+    moved = [any(f is h.fit for f in new.fit.others) for new, h in zip(found, fitted, strict=True)]
+    again = [[found[i].fit.values for i in held if moved[i]][:1] for held in parts]
+    return _from_starts(problem, found, again, workers)
+
+
+def _from_starts(
+    problem: Problem,
+    fitted: Sequence[Hypothesis],
+    starts: Sequence[Sequence[Mapping[str, float]]],
+    workers: Workers,
+) -> list[Hypothesis]:
+    """Sets fitted from further starts, which say where to begin beside their fits, and taken as one."""
+    tasks = [
+        (
+            index,
+            FitOrder(
+                h.fit.candidates,
+                h.fit.values | dict(start),
+                tuned.START_SHARES,
+                h.fit.misfit_with_prior + 2.0 * tuned.NEGLIGIBLE_SCORE,
+            ),
+        )
+        for index, (h, own) in enumerate(zip(fitted, starts, strict=True))
+        for start in own
+    ]
     answers = [[h.fit] for h in fitted]
     for (index, _), fit in zip(tasks, workers.fits(problem, [order for _, order in tasks]), strict=True):
         if fit is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -87,6 +88,22 @@ def test_sets_far_behind_and_effects_of_one_answer_are_left_alone():
     sets = [Hypothesis(other, -1.0), Hypothesis(behind, -1.0)]
     nothing = SimpleNamespace(fits=lambda problem, orders: [pytest.fail("fitted") for _ in orders])
     assert [h.fit for h in with_other_answers(None, sets, nothing)] == [other, behind]
+
+
+@pytest.mark.parametrize(("loose", "asked"), [(90.0, [18, 31, 20]), (110.0, [18, 31])])
+def test_a_set_that_holds_a_likelier_one_begins_where_that_moved(loose, asked):
+    more = replace(fit_at(4.0, cost=101.0), candidates=(candidate(), candidate("radiation")))
+    begun = []
+
+    def fits(problem, orders):
+        begun.extend(round(1e6 * order.start[CLEARANCE]) for order in orders)
+        ends = [fit_at(20.0, cost=loose) for _ in orders]
+        return [replace(e, candidates=o.candidates) for e, o in zip(ends, orders, strict=True)]
+
+    sets = [Hypothesis(fit_at(4.0), -1.0), Hypothesis(more, -1.0)]
+    part, whole = with_other_answers(None, sets, SimpleNamespace(fits=fits))
+    assert begun == asked
+    assert clearance_of(part.fit) == clearance_of(whole.fit) == pytest.approx(20.0 if loose < 100.0 else 4.0)
 
 
 def test_draws_are_of_all_answers_by_what_each_holds():
