@@ -46,13 +46,24 @@ def seat_faults(spec: MachineSpec, group: BearingSet) -> Iterator[SpindleFemErro
         if kind is None:
             continue
         for side, diameter in (("inner", kind.bore_diameter), ("outer", kind.outer_diameter)):
-            if seat_diameter(spec, kind, bearing, side) is None:
+            # A seat that no face touches is told by the geometry, with the face that is nearest.
+            if seat_diameter(spec, kind, bearing, side) is None and _touches(spec, diameter, bearing):
                 yield SpecError(
                     f"bearing_set.{group.name}.fit",
-                    f"the {side} ring of {bearing.name} sits on no part: none "
-                    f"has a face of {diameter * 1e3:g} mm there.",
+                    f"the {side} ring of {bearing.name} sits on no part: none that "
+                    f"{'turns' if side == 'inner' else 'stands'} has a face of {diameter * 1e3:g} mm there.",
                     "Allowed: rings on a rotating and a standing part; or leave the fit out.",
                 )
+
+
+def _touches(spec: MachineSpec, diameter: float, bearing: SetBearing) -> bool:
+    """Whether some part has a face of a diameter [m] somewhere along a bearing."""
+    return any(
+        segment.z[0] < bearing.z[1] and bearing.z[0] < segment.z[1]
+        for part in spec.part
+        for segment in part.segment
+        if min(abs(each - diameter) for each in (segment.inner_diameter, segment.outer_diameter)) < 1.0e-6
+    )
 
 
 def _fit_faults(group: BearingSet, kind: BallBearingType) -> Iterator[SpindleFemError]:

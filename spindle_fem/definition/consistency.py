@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
@@ -12,6 +12,7 @@ from spindle_fem.definition.bearing_seats import followed_joint_faults
 from spindle_fem.definition.bearing_types import BearingType
 from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.definition.displacement_faults import displacement_faults
+from spindle_fem.definition.field_types import is_name
 from spindle_fem.definition.machine_spec import MachineSpec, Probe
 from spindle_fem.definition.schema import names_of
 from spindle_fem.definition.standard_materials import MATERIALS
@@ -150,8 +151,12 @@ def find_faults(spec: MachineSpec, declared: Declared | None = None) -> list[Spi
     ]
 
 
-def _unknown(where: str, name: str, what: str, allowed: Iterable[str]) -> SpecError:
-    return SpecError(where, f'"{name}" is no {what} of this machine.', did_you_mean(name, allowed))
+def _unknown(
+    where: str, name: str, what: str, allowed: Iterable[str], may_be: Callable[[str], bool] = is_name
+) -> SpecError:
+    # A name that is refused where it is given is none to offer.
+    offered = [item for item in allowed if may_be(item)]
+    return SpecError(where, f'"{name}" is no {what} of this machine.', did_you_mean(name, offered))
 
 
 def _duplicates(declared: Declared) -> Iterator[SpindleFemError]:
@@ -187,11 +192,11 @@ def _materials(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemErro
     allowed = sorted({*materials, *MATERIALS})
     for part in spec.part:
         if part.material not in materials:
-            yield _unknown(f"part.{part.name}.material", part.material, "material", allowed)
+            yield _unknown(f"part.{part.name}.material", part.material, "material", allowed, bool)
     for name, kind in spec.bearing_types.items():
         for key in ("ring_material", f"{kind.element_word}_material"):
             if getattr(kind, key) not in materials:
-                yield _unknown(f"bearing_types.{name}.{key}", getattr(kind, key), "material", allowed)
+                yield _unknown(f"bearing_types.{name}.{key}", getattr(kind, key), "material", allowed, bool)
     # Steel's values, the defaults, are wrong by half for ceramics.
     mixed = {
         kind.element_material

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from spindle_fem.definition.bearing_types import BearingType
+from spindle_fem.definition.circuit_tables import CircuitFilm
 from spindle_fem.definition.exchange_tables import Surface
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.solid_tables import Part, SetBearing
 from spindle_fem.machine.geometry.part_shapes import (
     AnnularSegment,
@@ -57,3 +60,16 @@ def surface_definition(surface: Surface) -> SurfaceDefinition:
     """Faces selected by a ``[[surface]]``."""
     boxes = tuple(FaceBox(box.facing, box.z, box.r) for box in surface.where)
     return SurfaceDefinition(surface.name, surface.part, boxes)
+
+
+def surface_definitions(spec: MachineSpec) -> list[SurfaceDefinition]:
+    """Faces of every surface of a machine; walls of circuits with the key of their diameter."""
+    keys = {
+        name: f"film.{film.name}.{key}"
+        for film in spec.circuits
+        if isinstance(film, CircuitFilm)
+        for names in film.cell_surfaces
+        for name, key in zip(names, ("diameter", "outer_diameter"), strict=False)
+    }
+    found = map(surface_definition, spec.all_surfaces)
+    return [replace(surface, key=keys.get(surface.name, "")) for surface in found]

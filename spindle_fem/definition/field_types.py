@@ -262,8 +262,13 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.]{0,63}")
 NAME_RULE = "letters, digits, _ and . (first a letter or digit), at most 64 characters"
 
 
+def is_name(value: Any) -> bool:
+    """Whether a value may name a table."""
+    return isinstance(value, str) and _NAME.fullmatch(value) is not None
+
+
 def _read_name(value: Any) -> str:
-    if not isinstance(value, str) or _NAME.fullmatch(value) is None:
+    if not is_name(value):
         shown = f'"{value}"' if isinstance(value, str) else repr(value)
         _refuse(f"{shown} is not a name.", f"Allowed: {NAME_RULE}.")
     return value

@@ -7,7 +7,8 @@ import pytest
 from spindle_fem.definition.bearing_seats import followed_joint_faults, seat_diameter
 from spindle_fem.definition.exchange_tables import SeatSurface
 from spindle_fem.definition.load import load_machine
-from spindle_fem.errors import BadInputError, SpecError
+from spindle_fem.errors import BadInputError, FaultsError, SpecError
+from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.operating_point import OperatingPoint
 
@@ -72,6 +73,18 @@ def test_wetted_share_sets_the_way_of_heat_through_the_grease() -> None:
     assert 0.5 < paths["0"] < 2.0
 
 
+def test_rings_that_nothing_touches_are_told_once_and_with_the_face_that_is_nearest() -> None:
+    with pytest.raises(FaultsError) as caught:
+        load_machine(
+            "wu_tan_2016",
+            ["part.shaft.segment.front_seat.outer_diameter=139 mm"],
+            checks=(build_assembly,),
+        )
+    (text,) = map(str, caught.value.faults)
+    assert 'sit on nothing: part "shaft" ends at r 69.5 mm there, the seat is at r 70 mm' in text
+    assert '"F1.inner_ring", "F2.inner_ring"' in text
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
@@ -79,8 +92,8 @@ def test_wetted_share_sets_the_way_of_heat_through_the_grease() -> None:
         (["bearing_set.front.fit.outer_clearance=5 N"], "5 N"),
         (["bearing_set.front.fit.play=5 um"], "bearing_set.front.fit.play"),
         (
-            ["part.shaft.segment.front_seat.outer_diameter=139 mm"],
-            "bearing_set.front.fit: the inner ring of F1 sits on no part: none has a face of 140 mm there.",
+            ["part.shaft.rotating=false"],
+            "bearing_set.front.fit: the inner ring of F1 sits on no part: none that turns has a face",
         ),
         (["materials.cast_iron.thermal_expansion=12 K"], "thermal_expansion"),
         (

@@ -437,3 +437,11 @@ def test_the_check_command_prints_every_fault_and_exits_with_two(
 
 def test_there_are_at_least_sixty_broken_definitions():
     assert len(VALUES) + len(TOGETHER) + len(FILES) + len(BASES) + len(GEOMETRY) >= 60
+
+
+def test_a_refused_name_is_not_offered(tmp_path):
+    text = replaced('name = "outer_spacer"', 'name = "outer spacer"')
+    faults = faults_of(tmp_path, text + '[[source]]\nname = "motor"\npart = "windings"\nheat = "5 W"\n')
+    (unknown,) = [str(fault) for fault in faults if "windings" in str(fault)]
+    assert "outer spacer" not in unknown
+    assert "housing" in unknown

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -100,7 +101,10 @@ def test_overlap_names_both_parts():
 
 def test_floating_part_is_named():
     texts = faults_of([shaft(), hub(), PartGeometry("lost", (ring(200, 210, 5, 6),))])
-    assert texts == ['part "lost": touches no other part. Allowed: parts with a face in contact.']
+    assert texts == [
+        'part "lost": touches no other part; the nearest, part "shaft", is 100 mm away along z and '
+        "4 mm away along r. Allowed: parts with a face in contact."
+    ]
 
 
 def test_part_that_comes_apart():
@@ -130,6 +134,35 @@ def test_selector_without_a_face_lists_those_there_are():
     (text,) = faults_of([shaft()], [surface])
     assert 'surface "shaft.step", where[1]: facing "outward", r 25 mm matches no exposed face' in text
     assert "faces that look outward: r 20 mm, z 0 to 100 mm." in text
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_walls_of_a_circuit_are_told_once_by_the_key_of_the_circuit(backwards):
+    cells = [(0.0, 0.01), (0.01, 0.02), (0.02, 0.03)]
+    surfaces = [
+        SurfaceDefinition(
+            f"jacket.{number}", "shaft", (FaceBox("outward", z, (0.025, 0.025)),), "film.jacket.diameter"
+        )
+        for number, z in enumerate(cells[::-1] if backwards else cells, 1)
+    ]
+    (text,) = faults_of([shaft()], surfaces)
+    assert text.startswith('film.jacket.diameter: facing "outward", z 0 to 30 mm, r 25 mm matches no')
+    moved = [
+        replace(
+            each, where=(replace(each.where[0], z=tuple(z + 0.2 for z in each.where[0].z), r=(0.02,) * 2),)
+        )
+        for each in surfaces
+    ]
+    (text,) = faults_of([shaft()], moved)
+    assert text.startswith("film.jacket.z: ")
+
+
+def test_faces_that_an_overlap_cuts_are_no_faults_of_their_own():
+    surface = SurfaceDefinition("hub.bore", "hub", (FaceBox("inward", (0.0, 0.1), (0.02, 0.02)),))
+    thick = PartGeometry("shaft", (AnnularSegment(0.0, 0.1, 0.0, 0.0201),))
+    sleeve = PartGeometry("hub", (AnnularSegment(0.0, 0.1, 0.02, 0.03),))
+    (text,) = faults_of([thick, sleeve], [surface])
+    assert "overlaps" in text
 
 
 def test_surface_of_unknown_part_suggests_one():

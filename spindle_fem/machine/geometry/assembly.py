@@ -17,7 +17,7 @@ from spindle_fem.definition.drawn_tables import (
     element_rows,
     part_geometry,
     ring_geometries,
-    surface_definition,
+    surface_definitions,
 )
 from spindle_fem.errors import FaultsError, GeometryError
 from spindle_fem.machine.geometry.channel_geometry import (
@@ -103,7 +103,7 @@ def build_assembly(spec: MachineSpec, *, where: str | None = None) -> AssemblyGe
         kind = spec.bearing_types[group.type_name(bearing)]
         parts += ring_geometries(bearing, kind)
         balls += element_rows(bearing, kind)
-    surfaces = [surface_definition(surface) for surface in spec.all_surfaces]
+    surfaces = surface_definitions(spec)
     channel = _channel(spec)
     return assemble(
         parts,
@@ -152,7 +152,7 @@ def require_readable_geometry(spec: MachineSpec, readable: Readable) -> None:
     names = [part.name for part in parts]
     if len(set(names)) < len(names):
         return
-    surfaces = [surface_definition(item) for item in spec.all_surfaces if item.name in readable.surfaces]
+    surfaces = [item for item in surface_definitions(spec) if item.name in readable.surfaces]
     faults: list[GeometryError] = []
     meridian = MeridianMap.of_parts(parts, surfaces, faults)
     meridian.faults_of_sound_parts(surfaces, readable.parts, faults)

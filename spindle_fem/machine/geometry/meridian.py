@@ -24,7 +24,7 @@ from spindle_fem.machine.geometry.faces import (
     merge_pieces,
     to_nanometres,
 )
-from spindle_fem.machine.geometry.part_shapes import PartGeometry, SurfaceDefinition
+from spindle_fem.machine.geometry.part_shapes import FaceBox, PartGeometry, SurfaceDefinition
 
 # Lengths beyond which nothing is drawn, nm.
 LARGEST = 10**12
@@ -40,12 +40,15 @@ class MeridianMap:
     owner : (n + 1, m + 1) int32 ndarray
         Part of the cell below each pair of lines, VOID outside; the rim of
         cells around the grid is VOID.
+    cut : mapping of str to list of (z low, z high, r low, r high), [nm]
+        Segments that other parts overlap, whose faces are not where they are drawn.
     """
 
     part_names: tuple[str, ...]
     z_lines: NDArray[np.int64]
     r_lines: NDArray[np.int64]
     owner: NDArray[np.int32]
+    cut: Mapping[str, list[tuple[int, int, int, int]]]
 
     @classmethod
     def of_parts(
@@ -93,7 +96,14 @@ class MeridianMap:
                     "Parts may touch but not overlap.",
                 )
             )
-        return cls(names, z_lines, r_lines, owner)
+        cut: dict[str, list[tuple[int, int, int, int]]] = defaultdict(list)
+        for index, *a in boxes if overlaps else ():
+            if any(
+                index != other and a[0] < b[1] and b[0] < a[1] and a[2] < b[3] and b[2] < a[3]
+                for other, *b in boxes
+            ):
+                cut[names[index]].append(tuple(a))
+        return cls(names, z_lines, r_lines, owner, cut)
 
     def named_edges(
         self,
@@ -200,12 +210,24 @@ class MeridianMap:
             if not cells.any():
                 continue
             if len(self.part_names) > 1 and index not in touching:
-                faults.append(
-                    GeometryError(
-                        f'part "{name}"', "touches no other part.", "Allowed: parts with a face in contact."
-                    )
-                )
+                what = f"touches no other part; {self._nearest(index)}."
+                faults.append(GeometryError(f'part "{name}"', what, "Allowed: parts with a face in contact."))
         self._check_bodies(self.part_names, faults)
+
+    def _nearest(self, part: int) -> str:
+        """The other part that is nearest to one, and how far along the axis and outwards."""
+        boxes, owner = self.cell_boxes()
+        own, others = boxes[owner == part, None], boxes[(owner != part) & (owner != VOID)]
+        gaps = np.stack([others[..., ::2] - own[..., 1::2], own[..., ::2] - others[..., 1::2]]).max(axis=0)
+        away = np.maximum(gaps, 0)
+        first, second = np.unravel_index(np.argmin(np.hypot(*np.moveaxis(away, -1, 0))), away.shape[:2])
+        name = self.part_names[owner[(owner != part) & (owner != VOID)][second]]
+        far = [
+            f"{in_millimetres(value)} away {way}"
+            for value, way in zip(away[first, second], ("along z", "along r"), strict=True)
+            if value
+        ]
+        return f'the nearest, part "{name}", is {" and ".join(far)}'
 
     def _check_bodies(self, names: Collection[str], faults: list[GeometryError]) -> None:
         from scipy.ndimage import label
@@ -236,6 +258,16 @@ class MeridianMap:
                     )
                 )
 
+    def _is_cut(self, part: str, box: FaceBox) -> bool:
+        """Whether a box lies in a segment that another part overlaps."""
+        return any(
+            all(
+                bounds is None or (low <= to_nanometres(bounds[0]) and to_nanometres(bounds[1]) <= high)
+                for bounds, (low, high) in ((box.z, segment[:2]), (box.r, segment[2:]))
+            )
+            for segment in self.cut.get(part, ())
+        )
+
     def _label(
         self,
         pieces: list[Piece],
@@ -245,6 +277,7 @@ class MeridianMap:
     ) -> list[str]:
         names = self.part_names
         labels = [piece.joint_name(names) if piece.is_contact else "" for piece in pieces]
+        written = {surface.name: surface.key or f'surface "{surface.name}"' for surface in surfaces}
         claimed_twice: set[tuple[str, str]] = set()
         unmatched: list[tuple[SurfaceDefinition, int]] = []
         for surface in surfaces:
@@ -264,22 +297,25 @@ class MeridianMap:
                     for index, piece in enumerate(pieces)
                     if piece.is_exposed_of(part) and piece.lies_in(box)
                 ]
-                if not hits:
+                if not hits and not self._is_cut(surface.part, box):
                     unmatched.append((surface, number))
                 for index in hits:
                     if labels[index] not in ("", surface.name):
-                        claimed_twice.add((labels[index], surface.name))
+                        claimed_twice.add((written[labels[index]], written[surface.name]))
                     else:
                         labels[index] = surface.name
         for group in _in_rows(unmatched):
             surface, number = group[0]
             box, last = surface.where[number], group[-1][0]
-            what, places = f'surface "{surface.name}"', describe_box(box)
-            if last is surface:
+            ends = [] if box.z is None else sorted((*box.z, *last.where[number].z))
+            what = written[surface.name]
+            places = describe_box(replace(box, z=(ends[0], ends[-1]) if ends else None))
+            if surface.key:
+                what = _key_at_fault(surface, box, pieces, names.index(surface.part))
+            elif last is surface:
                 what += f", where[{number + 1}]"
             else:
                 what += f' to "{last.name}"'
-                places = describe_box(replace(box, z=(box.z[0], last.where[number].z[1])))
             faults.append(
                 GeometryError(
                     what,
@@ -291,8 +327,8 @@ class MeridianMap:
         for first, second in sorted(claimed_twice):
             faults.append(
                 GeometryError(
-                    f'surface "{second}"',
-                    f'claims a face that surface "{first}" has already.',
+                    second,
+                    f"claims a face that {first} has already.",
                     "Allowed: each face in one surface.",
                 )
             )
@@ -311,6 +347,13 @@ class MeridianMap:
         return labels
 
 
+def _key_at_fault(surface: SurfaceDefinition, box: FaceBox, pieces: Sequence[Piece], part: int) -> str:
+    """Key of the diameter that no face has, or of the z where one has it."""
+    radii = {piece.r for piece in pieces if piece.is_exposed_of(part) and piece.kind == "cylinder"}
+    right = box.r is not None and tuple(map(to_nanometres, box.r)) in radii
+    return surface.key.rpartition(".")[0] + ".z" if right else surface.key
+
+
 def _in_rows(
     unmatched: Sequence[tuple[SurfaceDefinition, int]],
 ) -> list[list[tuple[SurfaceDefinition, int]]]:
@@ -320,13 +363,14 @@ def _in_rows(
     for surface, number in unmatched:
         box, (base, _, cell) = surface.where[number], surface.name.rpartition(".")
         wall = (base if cell.isdigit() else surface.name, surface.part, number, box.facing, box.r)
-        row = ends.get((*wall, None if box.z is None else to_nanometres(box.z[0])))
+        # Cells follow the flow, which may go either way.
+        z = () if box.z is None else tuple(map(to_nanometres, box.z))
+        row = next((ends[*wall, end] for end in z if (*wall, end) in ends), None)
         if row is None or not cell.isdigit():
             row = []
             rows.append(row)
         row.append((surface, number))
-        if box.z is not None:
-            ends[*wall, to_nanometres(box.z[1])] = row
+        ends |= {(*wall, end): row for end in z}
     return rows
 
 

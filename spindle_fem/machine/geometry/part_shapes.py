@@ -48,11 +48,18 @@ class FaceBox:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceDefinition:
-    """A named exposed surface of one part, the union of its boxes."""
+    """A named exposed surface of one part, the union of its boxes.
+
+    Attributes
+    ----------
+    key : str
+        Key of the definition that gives its place, where that is no ``[[surface]]``.
+    """
 
     name: str
     part: str
     where: tuple[FaceBox, ...]
+    key: str = ""
 
 
 @dataclass(frozen=True, slots=True)
