@@ -42,7 +42,8 @@ class CircuitFilm(StreamFilm):
     """A separate coolant that flows along a duct and warms on its way.
 
     Bores and annuli are drawn as they are. Grooves around a sleeve and rows of bores are not: a plain
-    cylinder of the part, beside a void, stands for them and gives their heat. The walls need no
+    cylinder of the part, beside a void, stands for them and gives their heat. Of grooves that cylinder is
+    their floor: draw the sleeve turned down to it, without the lands between. The walls need no
     ``[[surface]]``: cells along the flow name them ``NAME.1``, ``NAME.2`` and so on from the inlet
     (``NAME.inner.1``, ``NAME.outer.1`` of an annulus, ``NAME.cover.1`` where a part covers grooves). Cells of
     ring grooves and of bores with several passes are side by side, each with its share of the flow.
@@ -61,8 +62,8 @@ class CircuitFilm(StreamFilm):
     """The part around an annulus, ``part`` itself where none is given; the part that covers grooves, at their
     depth from the floor, whose wall is dry where none is given."""
     diameter: PositiveLength
-    """Diameter of the wall as drawn: of the bore, inside an annulus, of the floor of grooves, or of what
-    stands for a row of axial bores."""
+    """Diameter of the wall as drawn, a face of ``part``: of the bore, inside an annulus, of the floor of
+    grooves, or of what stands for a row of axial bores."""
     outer_diameter: PositiveLength | None = None
     """Diameter of the outer wall of an annulus, at most twice the inner."""
     z: Range

@@ -155,7 +155,9 @@ class SetBearing(SpecModel):
     z: Range
     """Start and end of its rings, as long as the type is wide; or their start only."""
     takes_thrust: Literal["towards_rear", "towards_nose"] | None = None
-    """Direction of the force on the shaft that this ball bearing carries; rollers carry none."""
+    """Direction of the force on the shaft that this ball bearing carries; rollers carry none. `towards_rear`
+    in front and `towards_nose` behind it are back to back (contact lines above the axis: ``/ \\``), the other
+    way round face to face, twice the same tandem."""
     bearing_type: Annotated[str, Field(strict=True)] | None = None
     """Type if different from its set's: other balls, another contact angle; balls with balls only."""
 
@@ -215,7 +217,8 @@ class BearingSet(SpecModel):
     """A key of ``[bearing_types]``, or a bearing that ships, such as ``7014 C`` or ``NN3014 K``."""
     preload: PreloadOrClass = 0.0
     """Force through the set, which sets of ball bearings must give; bearings in tandem share it. `light`,
-    `medium` or `heavy` of bearings that ship. Rollers have `radial_clearance` instead."""
+    `medium` or `heavy` of bearings that ship; `"0 N"` of bearings that all face one way and that the springs
+    of another set load. Rollers have `radial_clearance` instead."""
     preload_kind: Literal["rigid", "elastic", "spring"] = "rigid"
     """Held by a distance (rings, locknut), by a distance between shaft, housing and spacers that give way
     along the axis, or by a force (springs). Springs may load a set whose bearings all

@@ -67,3 +67,8 @@ def test_everything_that_an_option_names_stands_in_the_page():
         for name in things:
             assert things.summary(name), f"{things.package}.{name} has no docstring"
             assert f"| `{name}` |" in page
+
+
+def test_the_range_of_a_film_of_turning_walls_is_told():
+    (line,) = [line for line in reference_page().splitlines() if line.startswith("| `turning` |")]
+    assert "reynolds 1000 to 100000" in line

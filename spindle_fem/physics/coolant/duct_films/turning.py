@@ -51,3 +51,6 @@ def turning(flow: DuctFlow) -> DuctFilm:
     if around == 0.0 or stirred < still.nusselt:
         return still
     return DuctFilm(stirred, "Gazley 1958", nusselt_gazley.faults(reynolds=reynolds, prandtl=flow.prandtl))
+
+
+turning.ranges = nusselt_gazley.ranges
