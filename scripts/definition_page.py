@@ -94,8 +94,9 @@ A changed value takes the mark that this file gives it, else U.
 
 `bearing_type = "7014 C"` names a bearing that ships (spaces as in `"7014 AC HC"`): 719xx, 70xx and 72xx with
 C (15°), E or AC (25°), N10xx and NN30xx with cylindrical rollers (`NN3014 K`), 60xx and 62xx with deep
-grooves, bores of 20 to 200 mm, with HC at the end for balls or rollers of silicon nitride. Boundary dimensions are those of ISO 15; the rest
-is estimated. Balls: {_estimate(RULE)}. Deep grooves: {_estimate(GROOVE_RULE)}; 10 µm of clearance as mounted.
+grooves, bores of 20 to 200 mm, with HC at the end for balls or rollers of silicon nitride. Boundary
+dimensions are those of ISO 15; the rest is estimated. Balls: {_estimate(RULE)}. Deep grooves:
+{_estimate(GROOVE_RULE)}; 10 µm of clearance as mounted.
 Rollers: {_estimate(ROLLER_RULE)}; no clearance as mounted. Makers' balls and rollers
 differ by up to a tenth in diameter and two in number. `[bearing_types.NN3014_K]` with single
 keys (or `--set bearing_types.NN3014_K.radial_clearance=-3um`) changes what that bearing has,
