@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -49,15 +50,15 @@ def run(
     from spindle_fem.commands.console import print_run
     from spindle_fem.commands.machine_commands import run_machine
 
-    summary = run_machine(
+    run_machine(
         machine,
         output,
         overrides=set_ or (),
         estimate_mesh_error=estimate_mesh_error,
         solid_growth=solid_growth,
         progress=not as_json,
+        shown=print_json if as_json else partial(print_run, folder=output),
     )
-    print_json(summary) if as_json else print_run(summary, output)
 
 
 @app.command()

@@ -113,6 +113,7 @@ _HARMS = (
     "counter_bearing_unloaded",
     "gross_sliding",
     "contact_pressure",
+    "seat_loose",
     "film_not_separating",
     "boundary_lubrication",
 )

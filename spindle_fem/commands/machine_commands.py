@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +28,7 @@ def run_machine(
     estimate_mesh_error: bool = False,
     solid_growth: bool = False,
     progress: bool = False,
+    shown: Callable[[dict[str, Any]], object] = lambda summary: None,
 ) -> dict[str, Any]:
     """Solve a machine and write summary, fields, pictures and report.
 
@@ -47,6 +48,8 @@ def run_machine(
         ``displacement`` of ``fields.vtu``.
     progress : bool
         Show the stage on the terminal.
+    shown : callable
+        Called with the summary before a failed self-check ends the run.
 
     Returns
     -------
@@ -83,8 +86,10 @@ def run_machine(
             tell("growth in three dimensions")
             result = result.with_solid_growth()
         write_outputs(result, place, started=started, notify=tell, helpers=helpers)
-    require_checks(result.checks, spec.name)
-    return read_content(place / "summary.json", SUMMARY_SCHEMA, "run")
+    summary = read_content(place / "summary.json", SUMMARY_SCHEMA, "run")
+    shown(summary)
+    require_checks(result.checks, spec.name, str(place / "report.html"))
+    return summary
 
 
 def check_machine(

@@ -129,8 +129,10 @@ def _steady_scene(spec: MachineSpec, solid: Solid, temperature: Array, growth: A
     scene = solid_scene(solid, {TEMPERATURE: temperature[None]}, shift=shift, exaggeration=factor)
     if shift is None:
         return scene
+    from spindle_fem.model.elastic.deformed_shape import still_place
+
     note = (
-        "Growth is the mean round the axis against the back of the flange, bending left out; covers move "
+        f"Growth is the mean round the axis against {still_place(spec)}, bending left out; covers move "
         "with the housing, balls and probes stay where they are drawn."
     )
     return replace(scene, notes=(note,))

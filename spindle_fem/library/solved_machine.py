@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.errors import SpecError
+from spindle_fem.model.elastic.deformed_shape import still_place
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.report.growth_chart import deformed_machine
 from spindle_fem.report.pyvista_grid import grid_of
@@ -70,7 +71,7 @@ class SolvedMachine(ThermalResult):
 
     def plot_growth(self) -> Figure | None:
         """Shaft, rings and housing displaced by growth, exaggerated; None without bearings on bodies."""
-        return deformed_machine(self.shapes)
+        return deformed_machine(self.shapes, still_place(self.spec))
 
 
 def solve(

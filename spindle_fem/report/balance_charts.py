@@ -25,21 +25,21 @@ from spindle_fem.report.figure_style import (
     styled,
 )
 from spindle_fem.report.leader_labels import spread
-from spindle_fem.report.run_tables import heat_by_source, readable
+from spindle_fem.report.run_tables import heat_by_sink, heat_by_source, readable
 from spindle_fem.results.thermal_result import CoolantResult, EnergyBalance, ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 
 
 @styled
-def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = ()) -> Figure:
-    """Heat sources and sinks, widths in proportion to W; each bearing as a whole."""
+def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = (), circuits: Iterable[str] = ()) -> Figure:
+    """Heat sources and sinks, widths in proportion to W; each bearing and each circuit as a whole."""
+    heat_out = heat_by_sink(energy.heat_out, circuits)
     sources = {
         name: value for name, value in heat_by_source(energy.heat_in_by, bearings).items() if value > 0.0
     }
-    sources |= {f"{name} (gains)": -value for name, value in energy.heat_out.items() if value < 0.0}
-    sinks = {name: value for name, value in energy.heat_out.items() if value > 0.0}
-    sources = dict(sorted(sources.items(), key=lambda item: -item[1]))
-    sinks = dict(sorted(sinks.items(), key=lambda item: -item[1]))
+    gains = {f"{name} (gains)": -value for name, value in heat_out.items() if value < 0.0}
+    sinks = {name: value for name, value in heat_out.items() if value > 0.0}
+    sources = dict(sorted((sources | gains).items(), key=lambda item: -item[1]))
     body = 410.0
     total = max(sum(sources.values()), sum(sinks.values()))
     # As high as the longer side needs, so that no band is pressed onto its neighbours.
@@ -48,10 +48,11 @@ def heat_balance(energy: EnergyBalance, bearings: Iterable[str] = ()) -> Figure:
     axes = pixel_axes(figure, 24.0, 100.0, 1552.0, height)
     axes.axis("off")
     axes.set(xlim=(0.0, 1552.0), ylim=(height, 0.0))
+    taken_up = f", {sum(gains.values()):.1f} W taken up from surroundings" if gains else ""
     set_title(
         figure,
         "Where the heat comes from and where it goes",
-        f"{energy.heat_in:.1f} W put in; imbalance {energy.imbalance_relative:.1e} of it.",
+        f"{energy.heat_in:.1f} W put in{taken_up}; imbalance {energy.imbalance_relative:.1e} of it.",
     )
     if total <= 0.0:
         axes.text(776.0, 0.5 * height, "No heat flows.", ha="center", va="center")

@@ -63,8 +63,11 @@ class _Grown(NamedTuple):
 
 
 @styled
-def deformed_machine(shapes: Mapping[str, BodyShape]) -> Figure | None:
-    """Upper half of every elastic body where its growth puts it; None where nothing moves."""
+def deformed_machine(shapes: Mapping[str, BodyShape], still: str) -> Figure | None:
+    """Upper half of every elastic body where its growth puts it; None where nothing moves.
+
+    ``still``: what stays in its place, in words.
+    """
     if not shapes:
         return None
     parts = [
@@ -80,18 +83,20 @@ def deformed_machine(shapes: Mapping[str, BodyShape]) -> Figure | None:
     return _picture(
         _Grown(*(np.concatenate(each) for each in zip(*parts, strict=True))),
         "Growth of the machine",
-        "Mean round the axis, against the back of the flange; dotted: as assembled. Bending is left out.",
+        f"Mean round the axis, against {still}; dotted: as assembled. Bending is left out.",
     )
 
 
 @styled
-def deformed_section(section: MeridianSection | None) -> Figure | None:
+def deformed_section(section: MeridianSection | None, still: str) -> Figure | None:
     """The machine in the vertical plane through its axis where its growth puts it; None where nothing moves.
 
     Parameters
     ----------
     section : MeridianSection or None
         With displacements along x, y, z [m] as values.
+    still : str
+        What stays in its place.
     """
     if section is None:
         return None
@@ -106,7 +111,7 @@ def deformed_section(section: MeridianSection | None) -> Figure | None:
             outlines.values[..., along],
         ),
         "Growth of the machine in three dimensions",
-        "Vertical plane through the axis (θ = 0 up), against the back of the flange, bending and what lies "
+        f"Vertical plane through the axis (θ = 0 up), against {still}, bending and what lies "
         "on one side included; dotted: as assembled.",
         "radius / mm (θ = 0 up)",
     )

@@ -31,7 +31,10 @@ def write_heat_charts(content: Mapping[str, Any], folder: Path) -> list[Path]:
         Made when missing.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    return [save_png(draw(content), folder / f"{name}.png") for name, draw in CHARTS.items()]
+    figures = {name: draw(content) for name, draw in CHARTS.items()}
+    return [
+        save_png(figure, folder / f"{name}.png") for name, figure in figures.items() if figure is not None
+    ]
 
 
 def _panels(number: int, title: str) -> tuple[Figure, Sequence[Axes]]:
@@ -123,12 +126,14 @@ def film_thickness(content: Mapping[str, Any]) -> Figure:
 
 
 @styled
-def loads_over_thrust(content: Mapping[str, Any]) -> Figure:
-    """Axial load and displacement of the preloaded set over the thrust."""
-    figure, axes = _panels(2, "Loads of the bearings over the thrust")
+def loads_over_thrust(content: Mapping[str, Any]) -> Figure | None:
+    """Axial load and displacement of the preloaded set over the thrust; None where none was varied."""
     rows = content["thrust"]
+    if not rows:
+        return None
+    figure, axes = _panels(2, "Loads of the bearings over the thrust")
     thrust = [row["thrust_N"] for row in rows]
-    for index, name in enumerate(rows[0]["bearings"] if rows else ()):
+    for index, name in enumerate(rows[0]["bearings"]):
         for panel, key in zip(axes, ("axial_load_N", "axial_displacement_um"), strict=True):
             panel.plot(
                 thrust,
@@ -143,7 +148,8 @@ def loads_over_thrust(content: Mapping[str, Any]) -> Figure:
         ("axial load / N", "displacement / µm"),
         strict=True,
     ):
-        panel.set(title=title, xlabel="thrust / N", ylabel=label, ylim=(0.0, None))
+        panel.set(title=title, xlabel="thrust / N", ylabel=label)
+        panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
     _legend(figure, axes[0])
     return figure
 
@@ -253,7 +259,7 @@ def heat_models(content: Mapping[str, Any]) -> Figure:
     return figure
 
 
-CHARTS: Mapping[str, Callable[[Mapping[str, Any]], Figure]] = {
+CHARTS: Mapping[str, Callable[[Mapping[str, Any]], Figure | None]] = {
     "film_thickness": film_thickness,
     "thrust": loads_over_thrust,
     "contacts": contacts_over_speed,

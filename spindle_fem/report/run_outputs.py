@@ -313,6 +313,7 @@ class _ChartWorker:
 
     def write_growth(self, shapes: Mapping[str, BodyShape], section: MeridianSection | None) -> float:
         """Write the growth of the bodies and pictures of the deformed machine; return the seconds."""
+        from spindle_fem.model.elastic.deformed_shape import still_place
         from spindle_fem.report.growth_chart import deformed_machine, deformed_section
         from spindle_fem.results.dataset import write_dataset
         from spindle_fem.results.growth_file import GROWTH_GROUP, growth_dataset
@@ -320,8 +321,13 @@ class _ChartWorker:
         began = time.perf_counter()
         if shapes:
             write_dataset(growth_dataset(shapes), self._folder / "result.nc", group=GROWTH_GROUP)
-        drawn = {"deformed_machine": lambda: deformed_machine(shapes)}
-        self._write_all(drawn | {"deformed_section": lambda: deformed_section(section)})
+        spec = self._result.spec
+        self._write_all(
+            {
+                "deformed_machine": lambda: deformed_machine(shapes, still_place(spec)),
+                "deformed_section": lambda: deformed_section(section, still_place(spec, solid=True)),
+            }
+        )
         return time.perf_counter() - began
 
     def write_report(self, summary: dict[str, Any], pictures: Mapping[str, Illustration]) -> None:
@@ -356,7 +362,7 @@ def draw_charts(result: ThermalResult) -> Mapping[str, Callable[[], Figure | Non
         "meridian_temperature": lambda: charts.meridian_temperature(result, section, bar),
         "radial_profiles": lambda: charts.radial_profiles(result, section),
         "axial_profiles": lambda: charts.axial_profiles(result, section),
-        "heat_balance": lambda: balance_charts.heat_balance(result.energy, result.bearings),
+        "heat_balance": lambda: balance_charts.heat_balance(result.energy, result.bearings, result.circuits),
         "heat_by_bearing": lambda: balance_charts.heat_by_bearing(result),
         "coolant": lambda: (
             None

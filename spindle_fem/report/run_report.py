@@ -125,7 +125,7 @@ def render_run_report(
         read = tables.displacement_table(summary)
         shown = [
             *_drawn(illustrations, "deformed_machine", "deformed_section"),
-            tables.growth_table(summary),
+            tables.growth_table(summary, _fitted(definition)),
             *(table for table in (tables.spacer_table(summary), nose, read) if table.rows),
             *_equilibrium(summary),
         ]
@@ -147,6 +147,12 @@ def render_run_report(
         Section("versions", "Versions and provenance", _versions(summary, dataset)),
     ]
     return render_document("Thermal run", dataset.attrs["title"], sections, _subtitle(definition))
+
+
+def _fitted(definition: Mapping[str, Any]) -> set[str]:
+    """Bearings of sets with a fit."""
+    sets = definition.get("bearing_set", ())
+    return {bearing["name"] for group in sets if "fit" in group for bearing in group["bearing"]}
 
 
 def _equilibrium(summary: Mapping[str, Any]) -> list[Any]:

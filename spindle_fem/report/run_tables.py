@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,10 @@ from spindle_fem.report.table_rows import (
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+# Walls of a circuit's cells, or the raceways that the oil of a bearing wets.
+_WALLS = r"{}\.(?:(?:(?:inner|outer)\.)?\d+|(?:inner|outer)_raceway)"
 
 
 def readable(name: str) -> str:
@@ -53,6 +58,21 @@ def heat_by_source(heat_in_by: Mapping[str, float], bearings: Iterable[str]) -> 
     return totals
 
 
+def heat_by_sink(heat_out: Mapping[str, float], circuits: Iterable[str]) -> dict[str, float]:
+    """Heat that leaves with the walls of each circuit added up; most first.
+
+    >>> heat_by_sink({"outside": 1.0, "jacket.1": 2.0, "jacket.2": 3.0, "R1.inner_raceway": 4.0},
+    ...              ["jacket", "R1.lubrication"])
+    {'jacket': 5.0, 'R1.lubrication': 4.0, 'outside': 1.0}
+    """
+    walls = {name: _WALLS.format(re.escape(name.removesuffix(".lubrication"))) for name in circuits}
+    totals: dict[str, float] = {}
+    for key, value in heat_out.items():
+        sink = next((name for name, wall in walls.items() if re.fullmatch(wall, key)), key)
+        totals[sink] = totals.get(sink, 0.0) + value
+    return dict(sorted(totals.items(), key=lambda item: -item[1]))
+
+
 def headline(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     """Cards with the numbers that a designer looks for first."""
     temperature, energy = summary["temperature"], summary["energy"]
@@ -80,13 +100,17 @@ def headline(summary: Mapping[str, Any]) -> list[dict[str, str]]:
             items.append((number(films[thin]), f"smallest film over roughness (lambda), {thin}"))
     items.append((f"{number(energy['heat_in_W'], 0)} W", "heat put in"))
     coolant = summary.get("coolant")
+    taken = {name: circuit["heat_W"] for name, circuit in (summary.get("circuits") or {}).items()}
     if coolant:
-        share = 100.0 * coolant["heat_W"] / energy["heat_in_W"] if energy["heat_in_W"] else math.nan
+        taken = {"channel": coolant["heat_W"], **taken}
+    if taken:
+        heat = sum(taken.values())
+        share = 100.0 * heat / energy["heat_in_W"] if energy["heat_in_W"] else math.nan
+        each = ", ".join(f"{readable(name)} {number(value, 0)} W" for name, value in taken.items())
+        what = f"taken by the coolant, {number(share, 0)} % of the heat put in"
+        items.append((f"{number(heat, 0)} W", f"{what}: {each}" if len(taken) > 1 else what))
+    if coolant:
         items += [
-            (
-                f"{number(coolant['heat_W'], 0)} W",
-                f"taken by the coolant, {number(share, 0)} % of the heat put in",
-            ),
             (
                 f"{number(coolant['outlet_degC'], 2)} °C",
                 f"coolant outlet, inlet {number(coolant['inlet_degC'], 1)} °C",
@@ -218,13 +242,13 @@ def balance_table(summary: Mapping[str, Any]) -> Table:
         return [name, number(value, 2), number(100.0 * value / scale)]
 
     sources = heat_by_source(energy.get("heat_in_by_W", {}), summary["bearings"])
-    sinks = sorted(energy["heat_out_W"].items(), key=lambda item: -item[1])
+    sinks = heat_by_sink(energy["heat_out_W"], summary.get("circuits") or {})
     rows = [
         {"kind": "group", "cells": ["put in"]},
         *rows_of(cells(readable(name), value) for name, value in sources.items()),
         {"kind": "total", "cells": ["sum", number(energy["heat_in_W"], 2), "100.0"]},
         {"kind": "group", "cells": ["leaves by"]},
-        *rows_of(cells(readable(name), value) for name, value in sinks),
+        *rows_of(cells(readable(name), value) for name, value in sinks.items()),
         {"kind": "total", "cells": cells("sum", sum(energy["heat_out_W"].values()))},
     ]
     columns = (column("heat"), column("W", number=True), column("% of heat put in", number=True))
@@ -237,8 +261,8 @@ def probe_table(summary: Mapping[str, Any]) -> Table:
     return table_of(fields, summary["probes"].items(), "What the probes should read.")
 
 
-def growth_table(summary: Mapping[str, Any]) -> Table:
-    """Fits and radial growth at every bearing."""
+def growth_table(summary: Mapping[str, Any], fitted: Collection[str]) -> Table:
+    """Fits and radial growth at every bearing; how a ring sits is known of ``fitted`` bearings only."""
     growth, fits = summary["growth"], summary["fits"]
 
     def row(bearing: str, side: str, ring: str) -> list[str]:
@@ -246,8 +270,8 @@ def growth_table(summary: Mapping[str, Any]) -> Table:
         return [
             bearing,
             f"{ring} ring on {side}" if side == "shaft" else f"{ring} ring in {side}",
-            number(fit["pressure_MPa"], 2),
-            number(fit["gap_um"], 1),
+            number(fit["pressure_MPa"], 2) if bearing in fitted else MISSING,
+            number(fit["gap_um"], 1) if bearing in fitted else MISSING,
             number(growth["seats"][bearing][f"{side}_um"]),
             number(growth["raceways"][bearing][f"{ring}_um"]),
         ]

@@ -252,8 +252,14 @@ def _thrust_sweep(
     point: OperatingPoint,
     temperatures: dict[str, BearingTemperatures],
 ) -> list[dict[str, Any]]:
-    """Axial load and displacement of the set that carries the thrust, up to twice the operating thrust."""
-    thrusts = np.linspace(0.0, 2.0 * point.thrust, THRUST_STEPS).tolist()
+    """Axial load and displacement of the set that carries the thrust, up to twice the operating thrust.
+
+    Without a thrust, up to twice the largest preload; no rows where there is none either.
+    """
+    largest = point.thrust or max((group.preload for group in spec.bearing_set), default=0.0)
+    if not largest:
+        return []
+    thrusts = np.linspace(0.0, 2.0 * largest, THRUST_STEPS).tolist()
     rows = [{"thrust_N": thrust, "bearings": {}} for thrust in thrusts]
     for group in spec.bearing_set:
         if group.carries_thrust:

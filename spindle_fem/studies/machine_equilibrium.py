@@ -10,6 +10,7 @@ from spindle_fem.results.thermal_result import BearingResult, Equilibrium
 from spindle_fem.solvers.coupled_steady import CoupledState
 from spindle_fem.solvers.preload_runaway import equilibria_above
 from spindle_fem.solvers.prepared_machine import PreparedMachine
+from spindle_fem.validity import CodedWarning
 
 # Pa; contact pressure below which bearing steel does not tire (ISO 281:2007, 9.3.3.1).
 FATIGUE_PRESSURE = 1.5e9
@@ -63,17 +64,26 @@ def assembled_preloads(spec: MachineSpec) -> dict[str, float]:
     }
 
 
-def _limits(spec: MachineSpec, coupled: CoupledState, bearings: dict[str, BearingResult]) -> list[str]:
+def contact_warnings(coupled: CoupledState) -> list[CodedWarning]:
+    """Contacts that tire, and inner rings that have come loose."""
     found = []
-    lubricants = {bearing.name: spec.lubricant_of(group) for group, bearing in spec.bearings}
     for name, heat in coupled.loads.bearing_heat.items():
         if heat.contact_pressure > FATIGUE_PRESSURE:
-            found.append(
+            text = (
                 f"{name}: contact pressure {heat.contact_pressure / 1e9:.2f} GPa, above the "
                 f"{FATIGUE_PRESSURE / 1e9:g} GPa that bearing steel bears without tiring."
             )
+            found.append(CodedWarning("contact_pressure", text))
         if heat.seat_pressure is not None and heat.seat_pressure[0] == 0.0:
-            found.append(f"{name}: the inner ring has lost its interference on the shaft.")
+            text = f"{name}: the inner ring has lost its interference on the shaft."
+            found.append(CodedWarning("seat_loose", text))
+    return found
+
+
+def _limits(spec: MachineSpec, coupled: CoupledState, bearings: dict[str, BearingResult]) -> list[str]:
+    found = [warning.text for warning in contact_warnings(coupled)]
+    lubricants = {bearing.name: spec.lubricant_of(group) for group, bearing in spec.bearings}
+    for name in coupled.loads.bearing_heat:
         hottest = max(bearings[name].temperature_inner, bearings[name].temperature_outer)
         lubricant = lubricants[name]
         if lubricant is not None and hottest > lubricant.temperature_limit:

@@ -96,8 +96,8 @@ def _within(name: str, value: float, limit: float, unit: str, explanation: str) 
     return Check(name, float(value), float(limit), unit, bool(value <= limit), explanation)
 
 
-def require_checks(checks: Iterable[Check], where: str) -> None:
-    """Raise when a check failed.
+def require_checks(checks: Iterable[Check], where: str, written: str = "") -> None:
+    """Raise when a check failed; ``written``: file with the results, for the message.
 
     Raises
     ------
@@ -111,5 +111,7 @@ def require_checks(checks: Iterable[Check], where: str) -> None:
             for check in failed
         )
         raise CheckFailedError(
-            where, f"a self-check failed: {listing}", "The results are written, do not rely on them."
+            where,
+            f"a self-check failed: {listing}",
+            f"The results are written{f' ({written})' if written else ''}, do not rely on them.",
         )

@@ -36,8 +36,8 @@ from spindle_fem.solvers.coupled_steady import (
 )
 from spindle_fem.solvers.prepared_machine import Clock, PreparedMachine, Progress, prepare_machine
 from spindle_fem.studies import run_checks as checks
-from spindle_fem.studies.machine_equilibrium import equilibrium_of
-from spindle_fem.validity import CodedWarning, by_consequence
+from spindle_fem.studies.machine_equilibrium import contact_warnings, equilibrium_of
+from spindle_fem.validity import CodedWarning, by_consequence, fold_warnings
 
 # Between the element sizes of the two meshes of an estimate.
 REFINEMENT_RATIO = 1.5
@@ -150,6 +150,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         *lost_to_air(spec),
         *speeds_beyond_catalogues(spec, point.speed),
         *_omitted_preload(spec, point, coupled, around),
+        *fold_warnings(contact_warnings(coupled), bearings),
     ]
     for lubricant in _lubricants(spec, bearings):
         done.append(lubricant)

@@ -102,3 +102,15 @@ def test_run_into_a_folder_of_other_things_is_refused(command, tmp_path):
     assert process.returncode == 2
     assert "letters.txt" in process.stderr
     assert (tmp_path / "letters.txt").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.render
+def test_a_failed_check_comes_with_the_tables_and_where_they_are(command, tmp_path):
+    done = command(
+        "run", "small_two_start", "--set", "mesh.preset=coarse", "--set", "mesh.order=1",
+        "--set", "grease.temperature_limit=21 degC", "-o", tmp_path / "out",
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "inner °C" in done.stdout
+    assert "grease temperature" in done.stderr
+    assert str(tmp_path / "out" / "report.html") in done.stderr.replace("\n", "")

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.elastic.elastic_body import ElasticBody, Face
 from spindle_fem.model.elastic.growth_outputs import AXIAL
-from spindle_fem.model.elastic.machine_growth import GrowthModel, Spacer, flange_back
+from spindle_fem.model.elastic.machine_growth import GrowthModel, Spacer, flange_back, holding_bearing
 from spindle_fem.model.elastic.preload_loop import TOUCHING, spacer_ends
 
 Array = NDArray[np.float64]
@@ -38,10 +39,18 @@ class BodyShape:
     shift: Array
 
 
+def still_place(spec: MachineSpec, *, solid: bool = False) -> str:
+    """What stays in its place in pictures of growth, those in three dimensions included, in words."""
+    if Layout(spec, set()).flange_ends() is not None:
+        return "the back of the flange"
+    held = None if solid else holding_bearing(spec)
+    return "the outside of the housing" if held is None else f"the seat of {held}"
+
+
 def deformed_shapes(
     model: GrowthModel, temperature: Array, speed: float, forces: Mapping[str, tuple[float, float]]
 ) -> dict[str, BodyShape]:
-    """Every body of a machine at a state, against the assembled one; the flange's back stays in its place.
+    """Every body of a machine at a state, against the assembled one; :func:`still_place` stays.
 
     Parameters as of :meth:`GrowthModel.at`. Bending is left out.
     """

@@ -135,6 +135,12 @@ def flange_back(layout: Layout) -> Face:
     return Face((max(flange.z),) * 2, (0.5 * below, 0.5 * flange.outer_diameter))
 
 
+def holding_bearing(spec: MachineSpec) -> str | None:
+    """The bearing that holds the shaft in place: the last of the set that carries thrust."""
+    sets = [group for group in spec.bearing_set if group.carries_thrust] or spec.bearing_set
+    return max(sets[0].bearing, key=lambda bearing: bearing.z[1]).name if sets else None
+
+
 class GrowthModel:
     """Elastic outputs of a machine over the unknowns of its thermal mesh.
 
@@ -317,11 +323,8 @@ class GrowthModel:
         return self._bent_rows(outputs).reshape(4, -1)
 
     def holding_seat(self, carrier: str) -> Face | None:
-        """Seat of the bearing that holds the shaft in place: the last of the set that carries thrust."""
-        sets = [group for group in self.spec.bearing_set if group.carries_thrust] or self.spec.bearing_set
-        if not sets:
-            return None
-        held = max(sets[0].bearing, key=lambda bearing: bearing.z[1]).name
+        """Seat of the bearing that holds the shaft in place."""
+        held = holding_bearing(self.spec)
         return next((s.face for s in self.bodies.seats if (s.bearing, s.carrier) == (held, carrier)), None)
 
     # ------------------------------------------------------------------ seats
