@@ -69,7 +69,9 @@ def surface_definitions(spec: MachineSpec) -> list[SurfaceDefinition]:
         for film in spec.circuits
         if isinstance(film, CircuitFilm)
         for names in film.cell_surfaces
-        for name, key in zip(names, ("diameter", "outer_diameter"), strict=False)
+        for name, key in zip(
+            names, ("diameter", "depth" if film.is_covered else "outer_diameter"), strict=False
+        )
     }
     found = map(surface_definition, spec.all_surfaces)
     return [replace(surface, key=keys.get(surface.name, "")) for surface in found]

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 # Walls of a circuit's cells, or the raceways that the oil of a bearing wets.
-_WALLS = r"{}\.(?:(?:(?:inner|outer)\.)?\d+|(?:inner|outer)_raceway)"
+_WALLS = r"{}\.(?:(?:(?:inner|outer|cover)\.)?\d+|(?:inner|outer)_raceway)"
 
 
 def readable(name: str) -> str:

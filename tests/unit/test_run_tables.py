@@ -18,7 +18,7 @@ from spindle_fem.studies.heat_study import THRUST_STEPS, heat_study
 from spindle_fem.studies.machine_equilibrium import contact_warnings
 
 CIRCUITS = {"jacket": {"heat_W": 71.0}, "R1.lubrication": {"heat_W": 4.0}}
-HEAT_OUT = {"jacket.1": 41.0, "jacket.2": 30.0, "R1.inner_raceway": 5.0, "R1.outer_raceway": -1.0}
+HEAT_OUT = {"jacket.1": 41.0, "jacket.cover.1": 30.0, "R1.inner_raceway": 5.0, "R1.outer_raceway": -1.0}
 SUMMARY = {
     "temperature": {"max_degC": 50.0, "max_at_mm": [1.0, 0.0, 2.0]},
     "energy": {"heat_in_W": 100.0, "heat_in_by_W": {"motor": 100.0}, "heat_out_W": {"cap": 25.0, **HEAT_OUT}},
