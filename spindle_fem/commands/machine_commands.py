@@ -16,7 +16,7 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
     from spindle_fem.definition.effect_entries import EffectEntry
-    from spindle_fem.definition.machine_spec import HeatSource, MachineSpec
+    from spindle_fem.definition.machine_spec import BearingSet, HeatSource, MachineSpec
     from spindle_fem.units import Uncertain
 
 
@@ -106,7 +106,8 @@ def check_machine(
     -------
     dict
         ``machine``, ``parts``, ``surfaces``, ``contacts``, ``probes``,
-        ``sources``, ``radial_loads`` (of bearing sets), ``effects``, ``assumed``
+        ``sources``, ``bearing_sets`` (with the preload that a class means), ``circuits``,
+        ``displacement_sensors``, ``radial_loads`` (of bearing sets), ``effects``, ``assumed``
         (what rules gave that the file leaves out), ``warnings``; of a ``[network]`` machine ``machine``,
         ``nodes``, ``boundaries``, ``links``, ``sources``, ``effects``,
         ``warnings``.
@@ -164,6 +165,15 @@ def check_machine(
             for probe in spec.probe
         ],
         "sources": [{"name": source.name, "detail": _source_detail(source)} for source in spec.source],
+        "bearing_sets": [{"name": group.name, "detail": _set_detail(group)} for group in spec.bearing_set],
+        "circuits": [
+            {"name": film.name, "detail": _stream_detail(film.fluid, film.flow, film.inlet_temperature)}
+            for film in spec.film
+            if film.kind in ("circuit", "wetted")
+        ],
+        "displacement_sensors": [
+            {"name": sensor.name, "detail": sensor.direction} for sensor in spec.displacement_sensor
+        ],
         "radial_loads": _radial_load_rows(spec),
         "effects": _effect_rows(spec.effects),
         "assumed": [
@@ -185,9 +195,21 @@ def _operation_rows(spec: MachineSpec) -> list[dict[str, str]]:
         "ambient": f"{point.ambient_temperature - ZERO_CELSIUS_K:.4g} °C",
     }
     if coolant is not None:
-        inlet = coolant.inlet_temperature - ZERO_CELSIUS_K
-        rows["coolant"] = f"{coolant.fluid}, {6e4 * coolant.flow:.4g} L/min at {inlet:.4g} °C"
+        rows["coolant"] = _stream_detail(coolant.fluid, coolant.flow, coolant.inlet_temperature)
     return [{"name": name, "detail": detail} for name, detail in rows.items()]
+
+
+def _stream_detail(fluid: str, flow: float, inlet: float) -> str:
+    return f"{fluid}, {6e4 * flow:.4g} L/min at {inlet - ZERO_CELSIUS_K:.4g} °C"
+
+
+def _set_detail(group: BearingSet) -> str:
+    """Bearings of a set, their types and what preloads them."""
+    types = ", ".join(dict.fromkeys(map(group.type_name, group.bearing)))
+    names = ", ".join(bearing.name for bearing in group.bearing)
+    rollers = group.bearing[0].takes_thrust is None
+    preload = "" if rollers else f", preload {group.preload:.4g} N ({group.preload_kind})"
+    return f"{names}: {types}{preload}{', carries thrust' if group.carries_thrust else ''}"
 
 
 def mesh_machine(machine: str | Path, file: Path, *, overrides: Iterable[str] = ()) -> dict[str, Any]:

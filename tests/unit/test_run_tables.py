@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 from matplotlib.patches import PathPatch
 
+from spindle_fem.commands.machine_commands import check_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.model.elastic.deformed_shape import still_place
 from spindle_fem.report import run_tables
@@ -92,3 +93,13 @@ def test_pictures_of_growth_name_what_stays():
     without = load_machine("router_spindle")
     assert still_place(without) == "the seat of F2"
     assert still_place(without, solid=True) == "the outside of the housing"
+
+
+def test_check_lists_sets_with_the_force_of_a_class_of_preload():
+    changes = ["bearing_set.front.preload=light"]
+    found = {
+        row["name"]: row["detail"]
+        for row in check_machine("router_spindle", overrides=changes)["bearing_sets"]
+    }
+    force = next(g.preload for g in load_machine("router_spindle", changes).bearing_set if g.name == "front")
+    assert f"preload {force:.4g} N" in found["front"]
