@@ -28,7 +28,18 @@ _BY_NAME = (
     ("cover", "#e0b98a"),
     ("flange", "#d8c9a6"),
 )
-_OTHERS = ("#d9a7a0", "#a9d4cf", "#e3c1d7", "#c7cf9b")
+_OTHERS = (
+    "#d9a7a0",
+    "#a9d4cf",
+    "#e3c1d7",
+    "#c7cf9b",
+    "#c9a27e",
+    "#9fb3d9",
+    "#efe3a0",
+    "#a3a3a3",
+    "#b08fb5",
+    "#7fb0a8",
+)
 BALL_COLOUR = "#f2f2f2"
 _NUMBER_SIZE = 8.5
 # Letters of an entry of the legend that fit half the width.
@@ -339,6 +350,9 @@ def _above(spec: MachineSpec) -> list[Label]:
         away = abs(math.sin(angle)) > 0.02
         text = f"{probe.name}\nθ = {math.degrees(angle):.0f}°" if away else probe.name
         labels.append(Label(text, np.array([z * MM, side * radius * MM])))
+    for sensor in spec.displacement_sensor:
+        if not isinstance(sensor.at, str):
+            labels.append(Label(sensor.name, np.array([sensor.at.z * MM, sensor.at.radius * MM])))
     for z, sign in _ports_in_plane(spec):
         if sign > 0.0:
             text = "coolant in" if abs(z - spec.channel.z_start) < 1.0e-9 else "coolant out"

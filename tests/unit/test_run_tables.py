@@ -13,6 +13,7 @@ from spindle_fem.model.elastic.deformed_shape import still_place
 from spindle_fem.report import run_tables
 from spindle_fem.report.balance_charts import heat_balance
 from spindle_fem.report.heat_charts import loads_over_thrust
+from spindle_fem.report.machine_drawing import part_colours
 from spindle_fem.report.run_report import _fitted
 from spindle_fem.report.table_rows import MISSING
 from spindle_fem.studies.heat_study import THRUST_STEPS, heat_study
@@ -103,3 +104,7 @@ def test_check_lists_sets_with_the_force_of_a_class_of_preload():
     }
     force = next(g.preload for g in load_machine("router_spindle", changes).bearing_set if g.name == "front")
     assert f"preload {force:.4g} N" in found["front"]
+
+
+def test_ten_parts_of_no_usual_kind_have_ten_colours():
+    assert len(set(part_colours([f"part_{number}" for number in range(10)]))) == 10
