@@ -24,11 +24,12 @@ PYTHONPATH="$source" "$work/venv/bin/python" -c \
     "from pathlib import Path; from tests.support.documented_commands import german_csv; german_csv(Path('measured.csv'))"
 "$spindle_fem" recording draft measured.csv --machine machine.toml -o recording
 "$spindle_fem" simulate machine.toml recording -o simulated "${coarse[@]}" >simulated.txt
+"$spindle_fem" diagnose machine.toml recording -o diagnosed "${coarse[@]}" >diagnosed.txt
 "$spindle_fem" examples -o mine
 # A notebook as jupyter runs it.
 "$work/venv/bin/python" -m pip install --quiet --disable-pip-version-check nbconvert ipykernel
 "$work/venv/bin/jupyter" nbconvert --log-level ERROR --execute --to html mine/examples/recording_to_diagnosis.ipynb
-for file in machine.png results/report.html results/fields.vtu recording/recording.toml simulated/report.html mine/examples/recording_to_diagnosis.html; do
+for file in machine.png results/report.html results/fields.vtu recording/recording.toml simulated/report.html diagnosed/report.html mine/examples/recording_to_diagnosis.html; do
     [ -e "$file" ] || { echo "the first hour lacks $file"; exit 1; }
 done
 "$work/venv/bin/python" -c "import spindle_fem; print('first hour done with', spindle_fem.__version__)"
