@@ -20,11 +20,11 @@ from .texts import try_text
 
 # For each family: function that tries one case, and number of cases.
 FAMILIES = {
-    "definitions": (try_definition, 2000),
+    "definitions": (try_definition, 1800),
     "recordings": (try_recording, 1000),
-    "studies": (try_study, 300),
-    "circuits": (try_circuit, 300),
-    "bearings": (try_bearing, 300),
+    "studies": (try_study, 150),
+    "circuits": (try_circuit, 200),
+    "bearings": (try_bearing, 150),
     "folders": (try_folder, 200),
     "texts": (try_text, texts.count()),
     "kills": (try_kill, sum(KILLS.values())),
