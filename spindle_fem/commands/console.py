@@ -131,6 +131,7 @@ def print_check(content: dict[str, Any], picture: Path | None = None) -> None:
     """Operation, parts, surfaces, contacts, probes and sources of a valid machine, and its picture."""
     console = open_console()
     drawn = "." if picture is None else f", drawn in {picture}."
+    _print_marked(console, content["machine"], f" is valid{drawn}", "bold")
     lists = [key for key, rows in content.items() if isinstance(rows, list)]
     for key in (key for key in lists if key not in ("assumed", "warnings")):
         if not content[key]:
