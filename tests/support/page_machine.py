@@ -119,7 +119,7 @@ TEN = (
     (
         'outer_diameter = "182 mm", z',
         'outer_diameter = "190 mm", z',
-        ('"jacket.outer.1" to "jacket.outer.8"', "r 95 mm matches no", "r 91 mm, z 130 to 330 mm"),
+        ("film.jacket.outer_diameter: facing", "r 95 mm matches no", "r 91 mm, z 130 to 330 mm"),
     ),
 )
 # Ten of other kinds.
