@@ -28,11 +28,7 @@ def require_possible_operation(spec: MachineSpec) -> None:
         A speed that no rolling bearing of these diameters reaches, air that no sensor on a machine reads, a
         coolant beyond its known properties.
     """
-    faults = list(_faults(spec))
-    if len(faults) == 1:
-        raise faults[0]
-    if faults:
-        raise FaultsError(spec.name, faults)
+    _refuse(spec, list(_faults(spec)))
 
 
 def require_possible_speeds(spec: MachineSpec, speeds: Iterable[float], where: str) -> None:
@@ -53,25 +49,35 @@ def require_seated_balls(spec: MachineSpec) -> None:
 
     Raises
     ------
-    SpecError
+    SpecError or FaultsError
     """
     # A definition with other faults may lack tables.
     if spec.heat is None or spec.heat.model == "table" or spec.operation is None or not spec.operation.speed:
         return
-    across = radial_loads(spec)
+    across, faults = radial_loads(spec), []
     for group in spec.bearing_set:
         if not group.faces_one_way:
             continue
         takes = group.bearing[0].takes_thrust
         force = spec.axial_load(group, spec.operation.thrust)
         if across[group.name] == 0.0 and not (force if takes == "towards_rear" else -force) > 0.0:
-            raise SpecError(
-                f"bearing_set.{group.name}.preload",
+            what = (
                 f'its bearings all take thrust "{takes}", and nothing presses them on: thrust and springs '
-                f"of other sets leave {force:g} N.",
-                "Allowed: bearings of both directions with a preload, or the springs of a set that faces the "
-                'other way (preload_kind = "spring").',
+                f"of other sets leave {force:g} N."
             )
+            fix = (
+                "Allowed: bearings of both directions with a preload, or the springs of a set that faces the "
+                'other way (preload_kind = "spring").'
+            )
+            faults.append(SpecError(f"bearing_set.{group.name}.preload", what, fix))
+    _refuse(spec, faults)
+
+
+def _refuse(spec: MachineSpec, faults: list[SpecError]) -> None:
+    if len(faults) == 1:
+        raise faults[0]
+    if faults:
+        raise FaultsError(spec.name, faults)
 
 
 def lost_to_air(spec: MachineSpec) -> tuple[CodedWarning, ...]:

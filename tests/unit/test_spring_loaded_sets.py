@@ -142,3 +142,10 @@ def test_check_refuses_a_shaft_that_nothing_holds(thrust, sound):
         return
     with pytest.raises(FaultsError, match=r"bearing_set\.front\.preload: .*nothing presses them on"):
         check_machine("motor_spindle", overrides=changes)
+
+
+def test_check_names_every_set_that_nothing_presses_on():
+    changes = [*FACING, TANDEM[1], "bearing_set.rear.preload=0 N", "operation.thrust=0 N"]
+    with pytest.raises(FaultsError) as told:
+        check_machine("motor_spindle", overrides=changes)
+    assert [f"bearing_set.{name}.preload" in str(told.value) for name in ("front", "rear")] == [True, True]

@@ -11,10 +11,10 @@ from spindle_fem.physics.coolant.rectangular_duct import laminar_numbers, requir
 
 @DUCT_KINDS.register
 def ring_grooves(shape: DuctShape) -> DuctSection:
-    """Half a ring of each groove is a path; floor and sides give their heat at the drawn floor.
+    """Half a ring of each groove is a path; floor and sides give their heat at the drawn walls.
 
-    And at the cover, where one is drawn. Sides count in full (true of grooves in metal that are not deeper
-    than wide). Entry and exit of a ring count as 1.5 velocity heads.
+    These are the floor, and the cover where one is named. Sides count in full (true of grooves in metal that
+    are not deeper than wide). Entry and exit of a ring count as 1.5 velocity heads.
 
     >>> section = ring_grooves(DuctShape(0.1, 0.06, width=6e-3, depth=4e-3, number=5))
     >>> section.paths, round(section.path_length, 4), round(section.wetted_ratio, 3)
