@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import errno
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 class SpindleFemError(Exception):
@@ -75,6 +75,14 @@ class FaultsError(SpecError):
         listing = "\n".join(f"  - {fault}" for fault in self.faults)
         number = len(self.faults)
         super().__init__(where, f"{number} fault{'s' if number != 1 else ''}\n{listing}")
+
+
+def raise_all(where: str, faults: Sequence[SpindleFemError]) -> None:
+    """Raise faults that were found, a single one as it is; nothing where there is none."""
+    if len(faults) == 1:
+        raise faults[0]
+    if faults:
+        raise FaultsError(where, faults)
 
 
 class GeometryError(BadInputError):

@@ -9,7 +9,7 @@ from spindle_fem.definition.bearing_types import RollerBearingType
 from spindle_fem.definition.lubrication_tables import LubricationFilm
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.stream_films import StreamFilm
-from spindle_fem.errors import FaultsError, SpecError
+from spindle_fem.errors import SpecError, raise_all
 from spindle_fem.operation.circuits import stream_fluid
 from spindle_fem.operation.radial_loads import radial_loads
 from spindle_fem.physics.bearings.bearing_kinds import BEARING_KINDS
@@ -28,7 +28,7 @@ def require_possible_operation(spec: MachineSpec) -> None:
         A speed that no rolling bearing of these diameters reaches, air that no sensor on a machine reads, a
         coolant beyond its known properties.
     """
-    _refuse(spec, list(_faults(spec)))
+    raise_all(spec.name, list(_faults(spec)))
 
 
 def require_possible_speeds(spec: MachineSpec, speeds: Iterable[float], where: str) -> None:
@@ -70,14 +70,7 @@ def require_seated_balls(spec: MachineSpec) -> None:
                 'other way (preload_kind = "spring").'
             )
             faults.append(SpecError(f"bearing_set.{group.name}.preload", what, fix))
-    _refuse(spec, faults)
-
-
-def _refuse(spec: MachineSpec, faults: list[SpecError]) -> None:
-    if len(faults) == 1:
-        raise faults[0]
-    if faults:
-        raise FaultsError(spec.name, faults)
+    raise_all(spec.name, faults)
 
 
 def lost_to_air(spec: MachineSpec) -> tuple[CodedWarning, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.errors import FaultsError, RecordingError, SpindleFemError, did_you_mean
+from spindle_fem.errors import RecordingError, SpindleFemError, did_you_mean, raise_all
 from spindle_fem.physics.bearings.highest_speed import too_fast
 from spindle_fem.physics.coolant.properties import coolant_by_name
 from spindle_fem.recordings.align import Recording
@@ -31,10 +31,7 @@ def require_possible_inputs(spec: MachineSpec, recording: Recording) -> tuple[st
     faults = list(_faults(spec, recording))
     if faults:
         faults += _unknown_probes(spec, recording)
-    if len(faults) == 1:
-        raise faults[0]
-    if faults:
-        raise FaultsError(recording.source, faults)
+    raise_all(recording.source, faults)
     return tuple(_unusual(spec, recording))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from spindle_fem.definition.displacement_tables import FRAME
 from spindle_fem.definition.exchange_tables import Gap
 from spindle_fem.definition.machine_spec import AnnulusSegment, MachineSpec, Part, Probe, Surface
-from spindle_fem.errors import SpecError
+from spindle_fem.errors import SpecError, raise_all
 
 # A segment is a flange where its diameter passes the next largest by this share.
 FLANGE_STEP = 1.1
@@ -213,18 +213,19 @@ def require_mounts(layout: Layout) -> None:
 
     Raises
     ------
-    SpecError
+    SpecError or FaultsError
     """
-    surfaces = {surface.name for surface in layout.spec.surface}
+    surfaces, faults = {surface.name for surface in layout.spec.surface}, []
     for sensor in layout.spec.displacement_sensor:
         if not isinstance(sensor.mount, str) or sensor.mount in surfaces:
             continue
         if not layout.flange or sensor.mount not in (layout.flange, FRAME):
             named = f"{layout.flange}, {FRAME}, " if layout.flange else ""
-            raise SpecError(
-                f"displacement_sensor.{sensor.name}.mount",
+            what = (
                 f'"{sensor.mount}" is not the flange of the housing.'
                 if layout.flange
-                else f"the housing has no flange: no segment is {FLANGE_STEP:g} times as wide as all others.",
-                f"Allowed: {named}a surface of a standing part, or z and radius of a spot on it.",
+                else f"the housing has no flange: no segment is {FLANGE_STEP:g} times as wide as all others."
             )
+            fix = f"Allowed: {named}a surface of a standing part, or z and radius of a spot on it."
+            faults.append(SpecError(f"displacement_sensor.{sensor.name}.mount", what, fix))
+    raise_all(layout.spec.name, faults)
