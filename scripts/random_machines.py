@@ -1,4 +1,4 @@
-"""Machines drawn at random over kinds of bearing, arrangement, drive and cooling, as raw definitions.
+"""Machines drawn at random over kinds of bearing, arrangement, drive, cooling and oil, as raw definitions.
 
 ``python -m scripts.random_machines --number 300 --seed 1`` draws them, checks, meshes and solves each by
 elements and by the machine's own network, and ends with status 1 if one neither solves nor is refused with a
@@ -19,6 +19,7 @@ import numpy as np
 import tomli_w
 
 import spindle_fem
+from scripts.random_kinds import add_kinds
 from spindle_fem.commands.checked_machine import load_buildable
 from spindle_fem.definition.bearing_catalogue import boundary_dimensions, catalogue_bearing
 from spindle_fem.errors import (
@@ -342,7 +343,8 @@ def main() -> int:
         for number in range(1, arguments.number + 1):
             if arguments.only not in (None, number):
                 continue
-            content = draw_machine(np.random.default_rng([arguments.seed, number]))
+            generator = np.random.default_rng([arguments.seed, number])
+            content = add_kinds(draw_machine(generator), generator)
             start = time.process_time()
             word, text = solve_machine(content, Path(folder) / "machine.toml", meshed=not arguments.network)
             counted[word] += 1
