@@ -114,6 +114,7 @@ _HARMS = (
     "gross_sliding",
     "contact_pressure",
     "seat_loose",
+    "ring_sticks",
     "film_not_separating",
     "boundary_lubrication",
 )

@@ -46,6 +46,7 @@ def bearing_faults(
         else:
             yield from _ball_set_faults(group)
             yield from _springs_and_thrust(group)
+            yield from _sliding_faults(group)
             if group.fit is not None:
                 yield from seat_faults(spec, group)
     carriers = [group.name for group in spec.bearing_set if group.carries_thrust]
@@ -118,6 +119,20 @@ def _springs_and_thrust(group: BearingSet) -> Iterator[SpindleFemError]:
             "Another set must hold the shaft; bearings at both ends that load each other are one set, where "
             "each may have a bearing_type of its own.",
         )
+
+
+def _sliding_faults(group: BearingSet) -> Iterator[SpindleFemError]:
+    """Rings said to slide that nothing presses on, or to be held where their springs load other sets."""
+    fit = group.fit
+    if fit is None:
+        return
+    where = f"bearing_set.{group.name}.fit.outer_ring"
+    if fit.outer_ring == "slides" and group.preload_kind != "spring":
+        what = f'preload_kind is "{group.preload_kind}": no spring presses rings that slide.'
+        yield SpecError(where, what, 'Allowed: "held", or preload_kind = "spring".')
+    if fit.outer_ring == "held" and group.spring_force:
+        what = "its bearings all face one way, on springs that load the set that holds the shaft."
+        yield SpecError(where, what, 'Allowed: "slides".')
 
 
 def _roller_set_faults(group: BearingSet) -> Iterator[SpindleFemError]:

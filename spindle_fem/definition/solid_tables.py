@@ -35,6 +35,7 @@ from spindle_fem.definition.lubrication_tables import Lubrication
 from spindle_fem.units import Uncertain
 
 PoissonRatio = quantity_field("", at_least=0.0, at_most=0.5)
+SeatFriction = quantity_field("", at_least=0.0, at_most=1.0)
 PathFill = quantity_field("", at_least=0.0, at_most=0.3)
 FilmStarvation = quantity_field("", at_least=0.1, at_most=1.0)
 ShearRatio = quantity_field("", at_least=0.005, at_most=0.2)
@@ -206,6 +207,13 @@ class Fit(SpecModel):
     """Clearance of the outer rings in the housing, on the diameter; negative: interference."""
     housing_outer_diameter: PositiveLength | None = None
     """Outer diameter of the wall around the outer rings; that of the part they sit in where none is given."""
+    outer_ring: Literal["slides", "held"] | None = None
+    """Springs find outer rings that slide in the housing, so that their force stays and lengthening by
+    temperature is taken up by travel, or rings held in stuck seats: the loop then closes as a locknut's,
+    whose rings are held, with the springs' force at assembly. Sliding with springs where nothing is given."""
+    seat_friction: SeatFriction = 0.12
+    """Friction of outer rings that slide in the housing: 0.12 of rings pressed in, 0.18 of rings pulled out
+    (NTN, Rolling bearings). Seats that hold more than the set's force are warned of."""
 
 
 class BearingSet(SpecModel):
@@ -253,6 +261,12 @@ class BearingSet(SpecModel):
         """Whether all of its bearings take thrust in one direction."""
         directions = {bearing.takes_thrust for bearing in self.bearing}
         return len(directions) == 1 and None not in directions
+
+    @property
+    def is_sprung(self) -> bool:
+        """Whether springs push rings that slide."""
+        held = self.fit is not None and self.fit.outer_ring == "held"
+        return self.preload_kind == "spring" and not held
 
     @property
     def spring_force(self) -> float:

@@ -53,7 +53,7 @@ def assembled_set(spec: MachineSpec, group: BearingSet) -> mounting.BearingSet |
         # Springs on bearings that all face one way are a load on them.
         preload=0.0 if group.spring_force else group.preload,
         assembled_force=_force_on_tandem(spec, group),
-        preload_kind="spring" if group.preload_kind == "spring" else "rigid",
+        preload_kind="spring" if group.is_sprung else "rigid",
         loop_stiffness=_loop_stiffness(spec, group),
         shaft_expansion=_seat_expansion(spec, group, "inner"),
         housing_expansion=_seat_expansion(spec, group, "outer"),

@@ -6,6 +6,7 @@ import math
 
 from spindle_fem.definition.machine_spec import Lubrication, MachineSpec
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.operation.sliding_rings import stuck_rings
 from spindle_fem.results.thermal_result import BearingResult, Equilibrium
 from spindle_fem.solvers.coupled_steady import CoupledState
 from spindle_fem.solvers.preload_runaway import equilibria_above
@@ -78,6 +79,20 @@ def contact_warnings(coupled: CoupledState) -> list[CodedWarning]:
             text = f"{name}: the inner ring has lost its interference on the shaft."
             found.append(CodedWarning("seat_loose", text))
     return found
+
+
+def sliding_warnings(machine: PreparedMachine, coupled: CoupledState) -> list[CodedWarning]:
+    """Outer rings that are to slide in the housing and that friction holds."""
+    if machine.growth is None:
+        return []
+    heats = coupled.loads.bearing_heat
+    pressing = {
+        seat.bearing: (heats[seat.bearing].seat_pressure[1], seat.face.area)
+        for seat in machine.growth.bodies.seats
+        if not seat.is_inner and heats[seat.bearing].seat_pressure is not None
+    }
+    groups = (group for group in machine.spec.bearing_set if group.fit is not None)
+    return [warning for group in groups for warning in stuck_rings(group, pressing)]
 
 
 def _limits(spec: MachineSpec, coupled: CoupledState, bearings: dict[str, BearingResult]) -> list[str]:

@@ -36,7 +36,7 @@ from spindle_fem.solvers.coupled_steady import (
 )
 from spindle_fem.solvers.prepared_machine import Clock, PreparedMachine, Progress, prepare_machine
 from spindle_fem.studies import run_checks as checks
-from spindle_fem.studies.machine_equilibrium import contact_warnings, equilibrium_of
+from spindle_fem.studies.machine_equilibrium import contact_warnings, equilibrium_of, sliding_warnings
 from spindle_fem.validity import CodedWarning, by_consequence, fold_warnings
 
 # Between the element sizes of the two meshes of an estimate.
@@ -151,6 +151,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         *speeds_beyond_catalogues(spec, point.speed),
         *_omitted_preload(spec, point, coupled, around),
         *fold_warnings(contact_warnings(coupled), bearings),
+        *sliding_warnings(machine, coupled),
     ]
     for lubricant in _lubricants(spec, bearings):
         done.append(lubricant)
