@@ -24,6 +24,7 @@ FILES = {
     "tests/published/test_catalogue_friction.py": "Friction of each kind at a catalogue's reference speeds",
     "tests/published/test_bearing_catalogue_rows.py": "Bearings that ship against rows of two catalogues",
     "tests/published/test_film_friction.py": "Viscosity, films and friction",
+    "tests/published/test_measured_friction.py": "Measured heat and rolling friction, conduction by balls",
     "tests/published/test_coolant_reference_values.py": "Oil and helical channels",
 }
 
@@ -119,6 +120,7 @@ def deviation_plot(rows: list, deviation: np.ndarray) -> Figure:
         "ball load at speed": lambda c, q: q.endswith("load, N"),
         "deflection at speed": lambda c, q: q.startswith("axial"),
         "viscosity and film": lambda c, q: q.startswith(("viscosity", "Roelands")) or "film" in q,
+        "ring to ring": lambda c, q: q.startswith("ring to ring"),
         "friction heat": lambda c, q: q.endswith(", W") or "sliding" in q,
     }
     groups: dict[str, list[float]] = {name: [] for name in kinds}

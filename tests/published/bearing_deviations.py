@@ -14,7 +14,6 @@ import numpy as np
 from spindle_fem.physics.bearings.bearing_geometry import BearingGeometry
 from spindle_fem.physics.bearings.bearing_set import solve_bearing
 from spindle_fem.physics.bearings.catalogue_friction import static_load_rating
-from spindle_fem.physics.bearings.grease import Lubricant
 from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.heat_models.full import rolling_resistance_houpert
 from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment, palmgren_roller_moment
@@ -31,6 +30,15 @@ from tests.published.test_catalogue_friction import (
     reference_heat,
     rollers,
 )
+from tests.published.test_measured_friction import (
+    GREASE,
+    JETS,
+    RUN_DOWNS,
+    jet_heat,
+    ring_to_ring,
+    rolling_forces,
+    run_down_force,
+)
 
 Row = tuple[str, str, float, float]
 FRONT = BearingGeometry(
@@ -39,7 +47,6 @@ FRONT = BearingGeometry(
 )  # fmt: skip
 HARRIS = BearingGeometry(22.225e-3, 16, 125.26e-3, math.radians(40.0), 0.5232, 0.5232, 206.8e9, 0.29)
 LE7 = BearingGeometry(7.938e-3, 10, 38.5e-3, math.radians(20.0), 0.56, 0.52, 199.948e9, 0.25, 7750.37)
-GREASE = Lubricant(21e-6, 4.7e-6, density=990.0, pressure_viscosity=1.8e-8)
 
 
 def turn(rpm: float) -> float:
@@ -49,7 +56,10 @@ def turn(rpm: float) -> float:
 
 def rows() -> list[Row]:
     """Case, quantity, published or independently recomputed value, value of this model."""
-    return [*static_rows(), *stiffness_rows(), *speed_rows(), *reference_speed_rows(), *lubricant_rows()]
+    return [
+        *static_rows(), *stiffness_rows(), *speed_rows(), *reference_speed_rows(), *measured_rows(),
+        *conductance_rows(), *lubricant_rows(),
+    ]  # fmt: skip
 
 
 def static_rows() -> list[Row]:
@@ -133,6 +143,36 @@ def speed_rows() -> list[Row]:
         )
         found += [
             (name, label, value, float(own)) for label, value, own in zip(labels, values, ours, strict=True)
+        ]
+    return found
+
+
+def measured_rows() -> list[Row]:
+    """Heat with oil jets and rolling force of light contacts, as they were measured."""
+    found = []
+    for rpm, measured in JETS.items():
+        heat, case = jet_heat(rpm), f"oil jets, 35 mm bore, 667 N, {rpm} rpm"
+        found += [
+            (case, "Palmgren f_0 6.6, W", measured, heat["palmgren"]),
+            (case, "full with Parker's share, W", measured, heat["full"]),
+        ]
+    for size, load in RUN_DOWNS:
+        for rpm in (60, 210):
+            case = f"ball of {size:g} mm, {load:g} N, races at {rpm} rpm"
+            measured = 1e3 * run_down_force(size, load, rpm)
+            ours = 1e3 * rolling_forces(size, load, rpm)["houpert"]
+            found.append((case, "Houpert rolling, mN", measured, ours))
+    return found
+
+
+def conductance_rows() -> list[Row]:
+    """Conduction from ring to ring through the balls by a maker's formula."""
+    found = []
+    for rpm in (500, 3000, 10_000):
+        case, to = f"7014 C, 294 N, grease, {rpm} rpm", ring_to_ring("7014 C", 294.0, rpm)
+        found += [
+            (case, "ring to ring, balls wetted over 30 %, W/K", to["fag"], to["ours"]),
+            (case, "ring to ring, wetted all round, W/K", to["fag"], to["wetted"]),
         ]
     return found
 
