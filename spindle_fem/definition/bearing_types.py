@@ -209,6 +209,11 @@ class BallBearingType(_BearingType):
         return self.ball_count * math.pi / 6.0 * self.ball_diameter**3
 
     @property
+    def element_surface(self) -> float:
+        """Surface of all balls, m²."""
+        return self.ball_count * math.pi * self.ball_diameter**2
+
+    @property
     def play(self) -> float:
         """Play of the raceways on the diameter before mounting, m."""
         apart = (self.groove_curvature_inner + self.groove_curvature_outer - 1.0) * self.ball_diameter
@@ -282,6 +287,11 @@ class RollerBearingType(_BearingType):
         """Volume of all rollers, m³."""
         one = 0.25 * math.pi * self.roller_diameter**2 * self.roller_length
         return self.rows * self.roller_count * one
+
+    @property
+    def element_surface(self) -> float:
+        """Surface of all rollers without their ends, m²."""
+        return self.rows * self.roller_count * math.pi * self.roller_diameter * self.roller_length
 
 
 def _elements(given: Any) -> str:

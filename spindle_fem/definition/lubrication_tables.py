@@ -37,9 +37,10 @@ OilFlow = quantity_field("m**3/s", above=0.0, at_most=1.0e-3)
 class Lubrication(SpecModel):
     """Oil instead of grease, for every bearing of a set.
 
-    Films and friction follow this oil. What flows carries heat away from both raceways of each bearing
-    (``NAME.inner_raceway``, ``NAME.outer_raceway``): it enters at `inlet_temperature`, warms by what
-    it takes and leaves the machine; the stream is called ``NAME.lubrication``.
+    Films and friction follow this oil. What flows carries heat away from both raceways and the balls or
+    rollers of each bearing (``NAME.inner_raceway``, ``NAME.outer_raceway``, ``NAME.balls``): it enters at
+    `inlet_temperature`, warms by what it takes and leaves the machine; the stream is called
+    ``NAME.lubrication``.
     """
 
     kind: LubricationKind
@@ -72,7 +73,7 @@ class Lubrication(SpecModel):
     film_starvation: FilmShare = 1.0
     """Film over the fully flooded one."""
     film_factor: UncertainNumber = Uncertain(1.0)
-    """Factor on the coefficient between raceways and stream."""
+    """Factor on the coefficients between stream and raceways, balls or rollers."""
     temperature_limit: Temperature = 373.15
     """The oil is checked against it."""
 
@@ -102,7 +103,7 @@ class LubricationFilm(StreamFilm):
     name: Name
     """Name of the bearing and ``.lubrication``."""
     bearing: Name
-    """Bearing whose raceways it wets."""
+    """Bearing whose raceways and rolling elements it wets."""
     lubrication: Lubrication
     """Lubrication of the set."""
     pitch_diameter: PositiveLength
@@ -117,6 +118,8 @@ class LubricationFilm(StreamFilm):
     """Outer diameter of the annulus between the rings."""
     rolls_on_balls: bool
     """Or on rollers."""
+    element_surface: Annotated[float, Field(gt=0.0)]
+    """Of all balls, or of all rollers without their ends, m²."""
     factor: UncertainNumber = Uncertain(1.0)
     """Factor on the coefficient."""
 
@@ -132,8 +135,13 @@ class LubricationFilm(StreamFilm):
 
     @property
     def cell_surfaces(self) -> tuple[tuple[str, ...], ...]:
-        """Both raceways meet one mixed stream."""
-        return ((f"{self.bearing}.inner_raceway", f"{self.bearing}.outer_raceway"),)
+        """Raceways and rolling elements meet one mixed stream."""
+        return ((f"{self.bearing}.inner_raceway", f"{self.bearing}.outer_raceway", self.ball_row),)
+
+    @property
+    def ball_row(self) -> str:
+        """The row of the bearing."""
+        return f"{self.bearing}.balls"
 
 
 __all__ = ["Lubrication", "LubricationFilm"]

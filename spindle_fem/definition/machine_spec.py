@@ -381,6 +381,11 @@ class MachineSpec(SpecModel):
         return tuple(film for film in self.film if isinstance(film, StreamFilm))
 
     @property
+    def wetted_rows(self) -> dict[str, LubricationFilm]:
+        """Streams by the row of balls or rollers that they flow around (``F1.balls``)."""
+        return {film.ball_row: film for film in self.film if isinstance(film, LubricationFilm)}
+
+    @property
     def source_inputs(self) -> tuple[str, ...]:
         """Recorded quantities that heat sources follow."""
         return tuple(dict.fromkeys(source.input for source in self.source if source.input is not None))
@@ -420,6 +425,7 @@ def _lubrication_film(group: BearingSet, bearing: SetBearing, kind: BearingType)
         inner_diameter=kind.inner_ring_outer_diameter,
         outer_diameter=kind.outer_ring_inner_diameter,
         rolls_on_balls=balls,
+        element_surface=kind.element_surface,
         factor=group.lubrication.film_factor,
     )
 

@@ -35,6 +35,11 @@ class StreamFilm(SpecModel):
         raise NotImplementedError
 
     @property
+    def ball_row(self) -> str | None:
+        """The row of balls or rollers among its walls (``F1.balls``), a body of one temperature."""
+        return None
+
+    @property
     def n_cells(self) -> int:
         """Along the flow."""
         return len(self.cell_surfaces)

@@ -97,6 +97,7 @@ def bearing_stream(film: LubricationFilm, speed: float) -> BearingStream:
         axial_cosine=film.axial_cosine,
         inner_diameter=film.inner_diameter,
         outer_diameter=film.outer_diameter,
+        on_balls=film.rolls_on_balls,
     )
 
 

@@ -64,6 +64,12 @@ def stream_answer(film: StreamFilm, speed: float) -> StreamAnswer:
     )
 
 
+def wall_coefficients(film: StreamFilm, answer: StreamAnswer) -> Array:
+    """Coefficient on every wall of a stream, in the order of ``film.surface``, (k,) W/(m²·K)."""
+    row = np.array([name == film.ball_row for name in film.surface])
+    return film.factor.value * np.where(row, answer.element_coefficient, answer.coefficient)
+
+
 def _expansion(film: CircuitFilm, flow: DuctFlow) -> tuple[str, ...]:
     """Air whose pressure falls by more than a tenth of an atmosphere is no fluid of constant density."""
     if film.fluid != "air" or flow.pressure_drop <= AIR_PRESSURE_DROP:

@@ -23,7 +23,7 @@ from spindle_fem.definition.machine_spec import (
 )
 from spindle_fem.definition.solid_tables import SetBearing
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
-from spindle_fem.operation.circuits import stream_answer, stream_warnings
+from spindle_fem.operation.circuits import stream_answer, stream_warnings, wall_coefficients
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.surroundings.air_gaps import AirGap
@@ -48,7 +48,7 @@ def fluid_temperature(film: Film, ambient: float) -> float:
 def film_coefficient(
     film: Film, point: OperatingPoint, wall: NDArray[np.float64], fluid: float
 ) -> tuple[NDArray[np.float64], tuple[CodedWarning, ...]]:
-    """Coefficient of a film on each facet.
+    """Coefficient of a film on each facet; those of streams are :func:`stream_coefficients`.
 
     Parameters
     ----------
@@ -63,12 +63,18 @@ def film_coefficient(
         return np.full(wall.shape, film.coefficient.value), ()
     if isinstance(film, NaturalFilm):
         return _natural_coefficient(film, wall, fluid), ()
-    if isinstance(film, StreamFilm):
-        answer = stream_answer(film, point.speed)
-        return np.full(wall.shape, film.factor.value * answer.coefficient), stream_warnings(film, answer)
     rotating = rotating_film(film.correlation, point.speed, film.diameter, minimum=film.minimum)
     warnings = tuple(CodedWarning(said.code, f"{film.surface[0]}: {said.text}") for said in rotating.warnings)
     return np.full(wall.shape, film.factor.value * rotating.value), warnings
+
+
+def stream_coefficients(
+    film: StreamFilm, point: OperatingPoint
+) -> tuple[dict[str, float], tuple[CodedWarning, ...]]:
+    """Coefficient of a stream on each of its walls, W/(m²·K)."""
+    answer = stream_answer(film, point.speed)
+    values = wall_coefficients(film, answer)
+    return dict(zip(film.surface, values.tolist(), strict=True)), stream_warnings(film, answer)
 
 
 def _natural_coefficient(film: NaturalFilm, wall: Array, fluid: ArrayLike) -> Array:
@@ -183,6 +189,10 @@ def linear_coefficients(
     values = {f"conductivity.{name}": item.thermal_conductivity for name, item in spec.materials.items()}
     values |= {f"joint.{name}": value for name, value in joint_conductances(spec, contacts).items()}
     for film in spec.film:
+        if isinstance(film, StreamFilm):
+            found, _ = stream_coefficients(film, point)
+            values |= {f"film.{surface}": value for surface, value in found.items()}
+            continue
         fluid = fluid_temperature(film, point.ambient_temperature)
         if isinstance(film, NaturalFilm):
             value = natural_reference(spec, film)

@@ -19,6 +19,7 @@ from spindle_fem.operation.coefficients import (
     film_coefficient,
     fluid_temperature,
     gap_coefficient,
+    stream_coefficients,
 )
 from spindle_fem.operation.coolant_loop import CoolantLoop, CoolantState
 from spindle_fem.operation.facet_centres import facet_centres
@@ -74,7 +75,11 @@ class LoadsBuilder:
         self.mesh = mesh
         self.heat_model = heat_model
         self.n_sectors = 1 if spec.mesh.circumferential_averaging else SECTORS_WITHOUT_AVERAGING
-        self.facet_area = facet_area
+        rows = {
+            row: np.full(self.n_sectors, film.element_surface / self.n_sectors)
+            for row, film in spec.wetted_rows.items()
+        }
+        self.facet_area = {**facet_area, **rows}
         self._centres = {name: facet_centres(mesh.points, facets) for name, facets in mesh.surfaces.items()}
         self.cells: ChannelCells | None = None
         self.coolant_loop: CoolantLoop | None = None
@@ -90,7 +95,9 @@ class LoadsBuilder:
 
     # ------------------------------------------------------------------ means
     def surface_mean(self, surface: str, state: FieldState) -> float:
-        """Area mean of the temperature over a surface, K."""
+        """Area mean of the temperature over a surface, or of a row of balls, K."""
+        if surface in self.spec.wetted_rows:
+            return self.ball_temperature(surface.removesuffix(".balls"), state)
         areas = self.facet_area[surface]
         return float(areas @ state.facets[surface] / areas.sum())
 
@@ -109,14 +116,20 @@ class LoadsBuilder:
         for _, bearing in self.spec.bearings:
             inner = self.surface_mean(f"{bearing.name}.inner_raceway", state)
             outer = self.surface_mean(f"{bearing.name}.outer_raceway", state)
-            balls = [state.lumped[name] for name in self.ball_nodes(bearing.name) if name in state.lumped]
-            ball = float(np.mean(balls)) if balls else 0.5 * (inner + outer)
+            ball = self.ball_temperature(bearing.name, state)
             shaft = self._seat(f"{bearing.name}.inner_ring", state, default=inner)
             housing = self._seat(f"{bearing.name}.outer_ring", state, default=outer)
             found[bearing.name] = BearingTemperatures(
                 inner, outer, ball, shaft, housing, state.shifts.get(bearing.name)
             )
         return found
+
+    def ball_temperature(self, bearing: str, state: FieldState) -> float:
+        """Mean temperature of the balls of a bearing; that of its raceways where the state has none, K."""
+        balls = [state.lumped[name] for name in self.ball_nodes(bearing) if name in state.lumped]
+        if balls:
+            return float(np.mean(balls))
+        return 0.5 * sum(self.surface_mean(f"{bearing}.{side}_raceway", state) for side in ("inner", "outer"))
 
     def _seat(self, ring: str, state: FieldState, default: float) -> float:
         """Temperature of what a ring sits on; a ring that is fused has its own."""
@@ -236,10 +249,10 @@ class LoadsBuilder:
     ) -> dict[str, FilmLoad]:
         films = {}
         for film in self.spec.film:
-            fluid = fluid_temperature(film, point.ambient_temperature)
             if isinstance(film, StreamFilm):
                 films |= self._circuit_films(film, point, state, warnings, change)
                 continue
+            fluid = fluid_temperature(film, point.ambient_temperature)
             for surface in film.surface:
                 wall = state.facets[surface]
                 coefficient, said = film_coefficient(film, point, wall, fluid)
@@ -260,13 +273,11 @@ class LoadsBuilder:
         change: LoadChange,
     ) -> dict[str, FilmLoad]:
         """Films of a circuit's walls, its coolant warmed by those that it has passed."""
-        value, said = film_coefficient(film, point, np.zeros(1), film.inlet_temperature)
+        values, said = stream_coefficients(film, point)
         warnings += said
         coefficients = {
-            surface: np.full(
-                self.facet_area[surface].shape, float(value[0]) * change.factor(f"film.{surface}")
-            )
-            for surface in film.surface
+            surface: np.full(self.facet_area[surface].shape, value * change.factor(f"film.{surface}"))
+            for surface, value in values.items()
         }
         coolant, _ = self.circuit_coolant(film, coefficients, state, point.inlet_of(film))
         return {

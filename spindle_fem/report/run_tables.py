@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 # Walls of a circuit's cells, or the raceways that the oil of a bearing wets.
-_WALLS = r"{}\.(?:(?:(?:inner|outer|cover)\.)?\d+|(?:inner|outer)_raceway)"
+_WALLS = r"{}\.(?:(?:(?:inner|outer|cover)\.)?\d+|(?:inner|outer)_raceway|balls)"
 
 
 def readable(name: str) -> str:
@@ -61,7 +61,7 @@ def heat_by_source(heat_in_by: Mapping[str, float], bearings: Iterable[str]) -> 
 def heat_by_sink(heat_out: Mapping[str, float], circuits: Iterable[str]) -> dict[str, float]:
     """Heat that leaves with the walls of each circuit added up; most first.
 
-    >>> heat_by_sink({"outside": 1.0, "jacket.1": 2.0, "jacket.2": 3.0, "R1.inner_raceway": 4.0},
+    >>> heat_by_sink({"outside": 1.0, "jacket.1": 2.0, "jacket.2": 3.0, "R1.balls": 4.0},
     ...              ["jacket", "R1.lubrication"])
     {'jacket': 5.0, 'R1.lubrication': 4.0, 'outside': 1.0}
     """

@@ -263,7 +263,8 @@ def circuit_outlets(machine: PreparedMachine, solution: ConductionSolution, load
     circuits = machine.spec.circuits
     if not circuits:
         return {}
-    field = machine.field_state(solution.temperature, {})
+    lumped = dict(zip(solution.problem.lumped_names, solution.lumped_temperature.tolist(), strict=True))
+    field = machine.field_state(solution.temperature, lumped)
     films = {name: film.coefficient for name, film in loads.films.items()}
     return {
         film.name: machine.builder.circuit_coolant(film, films, field, loads.inlets[film.name])[1]

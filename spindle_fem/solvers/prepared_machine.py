@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.elastic.machine_growth import GrowthModel
-from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedLink, LumpedNode
 from spindle_fem.model.mesh.kernels.compile import compile_kernels
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operators
 from spindle_fem.operation.bearing_heat import (
@@ -74,11 +74,21 @@ class PreparedMachine:
         shifts = {} if self.growth is None else self.growth.shifts(unknowns)
         return FieldState(facets, sides, lumped, shifts)
 
+    def _links(self, loads: Loads) -> Iterator[LumpedLink]:
+        """Films of streams on rows of balls, node by node."""
+        for row in self.spec.wetted_rows:
+            film = loads.films[row]
+            conductance = (film.coefficient * self.builder.facet_area[row]).tolist()
+            nodes = self.builder.ball_nodes(row.removesuffix(".balls"))
+            for node, value, fluid in zip(nodes, conductance, film.temperature.tolist(), strict=True):
+                yield LumpedLink(node, value, temperature=fluid, name=film.name)
+
     def problem(self, loads: Loads) -> ConductionProblem:
         """Conduction problem of given loads."""
         films = tuple(
             Film(surface, film.coefficient, film.temperature, film.name)
             for surface, film in loads.films.items()
+            if surface in self.operators.surface_rows
         )
         lumped = tuple(
             LumpedNode(node.name, tuple(node.connections.items()), node.capacity, node.heat)
@@ -106,6 +116,7 @@ class PreparedMachine:
             },
             capacity_scale=change.capacity_scale,
             lumped_nodes=lumped,
+            lumped_links=tuple(self._links(loads)),
             volumetric_capacity=self.volumetric_capacity,
             adiabatic="rest",
         )

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from spindle_fem.model.elastic.machine_growth import GrowthModel, Motions
 from spindle_fem.model.mesh.evaluate import mean_matrix, probe_matrix
-from spindle_fem.operation.circuits import CircuitMarch, stream_answer, wall_cells
+from spindle_fem.operation.circuits import CircuitMarch, stream_answer, wall_cells, wall_coefficients
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 
@@ -61,10 +61,14 @@ class ReadingRows:
                 nodes = machine.builder.ball_nodes(name)
                 for node in nodes:
                     balls[row, operators.n_unknowns + lumped_names.index(node)] = 1.0 / len(nodes)
-            blocks.append(sparse.csr_array(balls))
-        if spec.circuits:
-            walls = [name for film in spec.circuits for name in film.surface]
+            balls = sparse.csr_array(balls)
+            blocks.append(balls)
+        for film in spec.circuits:
+            walls = [name for name in film.surface if name != film.ball_row]
             blocks.append(_widened(mean_matrix(operators, walls), width))
+            if film.ball_row is not None:
+                own = bearings.index(film.ball_row.removesuffix(".balls"))
+                blocks.append(balls[[own]])
         growth = machine.growth
         if growth is None and spec.displacement_sensor:
             # Sensors see growth whether or not preload follows it.
@@ -127,8 +131,8 @@ class ReadingRows:
         speeds = np.array([point.speed for point in points])
         found = np.empty(len(times))
         for speed in np.unique(speeds):
-            value = film.factor.value * stream_answer(film, float(speed)).coefficient
-            weights = CircuitMarch.of(film, value * areas, wall_cells(film)).outlet
+            values = wall_coefficients(film, stream_answer(film, float(speed)))
+            weights = CircuitMarch.of(film, values * areas, wall_cells(film)).outlet
             then = speeds == speed
             found[then] = inlet[then] + walls[then] @ weights
         return found

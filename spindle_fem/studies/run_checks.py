@@ -60,14 +60,14 @@ def check_coldest(coldest_inside: float, coldest_outside: float) -> Check:
 
 
 def check_lubricant(word: str, temperatures: dict[str, float], limit: float) -> Check:
-    """The lubricant stays below its limit; ``temperatures`` is the warmer raceway of each bearing, K."""
+    """The lubricant stays below its limit; ``temperatures`` is the warmest that each bearing's meets, K."""
     hottest = max(temperatures, key=temperatures.get)
     return _within(
         f"{word} temperature",
         temperatures[hottest] - ZERO_CELSIUS_K,
         limit - ZERO_CELSIUS_K,
         "degC",
-        f"Warmest raceway: {hottest}.",
+        f"Warmest {'raceway' if word == 'grease' else 'raceway or balls'}: {hottest}.",
     )
 
 

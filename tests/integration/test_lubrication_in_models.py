@@ -53,13 +53,18 @@ def test_every_stream_takes_what_its_raceways_give(result, spec):
         assert circuit.heat == pytest.approx(capacity_rate(film) * rise, rel=1e-8)
         given = sum(result.energy.heat_out[name] for name in film.surface)
         assert circuit.heat == pytest.approx(given, rel=1e-12)
+        # Balls give it their film times their surface times how much warmer they are than what passes them.
+        row = film.ball_row
+        warmer = result.bearings[film.bearing].temperature_ball - result.fluid_temperature[row][0]
+        conducts = float(result.film_coefficient[row][0]) * film.element_surface
+        assert result.energy.heat_out[row] == pytest.approx(conducts * warmer, rel=1e-6)
     assert all(check.passed for check in result.checks)
     names = {check.name for check in result.checks}
     assert {"circuit enthalpy", "oil temperature"} <= names
     assert "grease temperature" not in names
-    # Half a litre of oil a minute takes most of a rear bearing's heat, air some watts of a front one's.
+    # Half a litre of oil a minute takes most of a rear bearing's heat, air a quarter of a front one's.
     assert result.circuits["R1.lubrication"].heat > 0.5 * result.bearings["R1"].heat
-    assert 0.5 < result.circuits["F1.lubrication"].heat < 0.2 * result.bearings["F1"].heat
+    assert 0.5 < result.circuits["F1.lubrication"].heat < 0.3 * result.bearings["F1"].heat
 
 
 def test_the_network_gives_the_oil_about_as_much(result, spec):

@@ -10,7 +10,13 @@ from spindle_fem.definition.lubrication_tables import Lubrication
 from spindle_fem.errors import FaultsError
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.bearing_lubricants import SetLubricant, bearing_stream
-from spindle_fem.operation.circuits import capacity_rate, coolant_temperatures, stream_answer, stream_warnings
+from spindle_fem.operation.circuits import (
+    capacity_rate,
+    coolant_temperatures,
+    stream_answer,
+    stream_warnings,
+    wall_coefficients,
+)
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment
 from spindle_fem.physics.coolant.lubrication_kind import film_harris, flooded_fill, path_fill_parker
@@ -56,16 +62,34 @@ def test_at_rest_oil_still_conducts_through_its_slit(spec):
     assert answer.coefficient == pytest.approx(7.541 * 0.136 / width, rel=0.03)
 
 
-def test_what_raceways_give_the_stream_carries_away(spec):
+def test_air_around_balls_by_hand(spec):
+    # 7.1 mm balls that turn about their own axes in air which goes around with the cage (Whitaker 1972).
+    own = film(spec, "F1")
+    answer, stream = stream_answer(own, 12_000 * RPM), bearing_stream(own, 12_000 * RPM)
+    pitch, ball = stream.pitch_diameter, stream.element_diameter
+    turning = 12_000 * RPM * pitch / (2.0 * ball) * (1.0 - stream.relative_size**2)
+    through = 0.5e-3 / (0.25 * math.pi * (stream.outer_diameter**2 - stream.inner_diameter**2))
+    reynolds = math.hypot(0.5 * turning * ball, through) * ball / 1.506e-5
+    prandtl = 1.204 * 1006.0 * 1.506e-5 / 0.0259
+    nusselt = 2.0 + (0.4 * reynolds**0.5 + 0.06 * reynolds ** (2.0 / 3.0)) * prandtl**0.4
+    assert answer.element_coefficient == pytest.approx(nusselt * 0.0259 / ball, rel=1e-12)
+    kind = next(spec.bearing_types[g.type_name(b)] for g, b in spec.bearings if b.name == "F1")
+    assert own.element_surface == pytest.approx(kind.ball_count * math.pi * ball**2, rel=1e-12)
+    assert wall_coefficients(own, answer) == pytest.approx(
+        own.factor.value * np.array([answer.coefficient, answer.coefficient, answer.element_coefficient])
+    )
+
+
+def test_what_its_walls_give_the_stream_carries_away(spec):
     own = film(spec, "R1")
-    names, conductance = own.surface, {own.surface[0]: 3.0, own.surface[1]: 5.0}
-    wall = {names[0]: 330.0, names[1]: 310.0}
+    names, conductance = own.surface, dict(zip(own.surface, (3.0, 5.0, 2.0), strict=True))
+    wall = dict(zip(names, (330.0, 310.0, 345.0), strict=True))
     bulk, outlet = coolant_temperatures(own, conductance, wall, own.inlet_temperature)
     given = sum(conductance[name] * (wall[name] - bulk[name]) for name in names)
     assert given == pytest.approx(capacity_rate(own) * (outlet - own.inlet_temperature), rel=1e-12)
     # One mixed stream past walls of their common mean: 1 - exp(-N) of the rise.
-    mean = (3.0 * 330.0 + 5.0 * 310.0) / 8.0
-    units = 8.0 / capacity_rate(own)
+    mean = (3.0 * 330.0 + 5.0 * 310.0 + 2.0 * 345.0) / 10.0
+    units = 10.0 / capacity_rate(own)
     expected = own.inlet_temperature - (mean - own.inlet_temperature) * math.expm1(-units)
     assert outlet == pytest.approx(expected, rel=1e-12)
 

@@ -244,6 +244,12 @@ def build_machine_network(
         name: surface_patch(faces, cells, partition, centres, conductivity)
         for name, faces in exposed_surfaces(cells).items()
     }
+    ball_nodes = {bearing.name: len(partition.node_names) + i for i, (_, bearing) in enumerate(spec.bearings)}
+    for row, film in spec.wetted_rows.items():
+        node, z = ball_nodes[film.bearing], surfaces[f"{film.bearing}.outer_raceway"].z.mean()
+        surfaces[row] = SurfacePatch(
+            np.array([node]), np.zeros(1), np.array([film.element_surface]), np.array([z])
+        )
     narrow = {name: surfaces[name].between(*span) for name, span in (bands or {}).items()}
     gaps = {gap.name: _air_bands(spec, gap, surfaces, cells, partition, spans[gap.name]) for gap in spec.gap}
     coolant = None
@@ -267,9 +273,7 @@ def build_machine_network(
         node_names=names,
         capacity=capacity,
         refinement=int(refinement),
-        ball_nodes={
-            bearing.name: len(partition.node_names) + i for i, (_, bearing) in enumerate(spec.bearings)
-        },
+        ball_nodes=ball_nodes,
         seats={
             ring: _seat(cells, partition, ring)
             for _, bearing in spec.bearings

@@ -25,7 +25,12 @@ from spindle_fem.model.lumped.links import SurfacePatch
 from spindle_fem.model.lumped.machine_network import MachineNetwork
 from spindle_fem.operation.bearing_heat import BearingTemperatures, HeatModel
 from spindle_fem.operation.circuits import CircuitMarch, wall_cells
-from spindle_fem.operation.coefficients import ball_conductances, film_coefficient, gap_coefficient
+from spindle_fem.operation.coefficients import (
+    ball_conductances,
+    film_coefficient,
+    gap_coefficient,
+    stream_coefficients,
+)
 from spindle_fem.operation.friction_map import film_temperature
 from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import BearingHeat
@@ -345,11 +350,11 @@ def _air(machine: MachineNetwork, point: OperatingPoint, boundaries, links, laws
 
 def _circuit(machine: MachineNetwork, film: StreamFilm, point: OperatingPoint) -> CircuitLaw:
     """The coolant of a circuit, eliminated: it holds no heat of its own."""
-    value, _ = film_coefficient(film, point, np.zeros(1), film.inlet_temperature)
-    patches = [machine.surfaces[surface] for surface in film.surface]
-    patch = SurfacePatch.joined(patches)
-    cell = np.repeat(wall_cells(film), [len(item.node) for item in patches])
-    conductance = 1.0 / (patch.resistance + 1.0 / (float(value[0]) * patch.area))
+    values, _ = stream_coefficients(film, point)
+    patches = [machine.surfaces[surface] for surface in values]
+    patch, faces = SurfacePatch.joined(patches), [len(item.node) for item in patches]
+    cell, value = np.repeat(wall_cells(film), faces), np.repeat(list(values.values()), faces)
+    conductance = 1.0 / (patch.resistance + 1.0 / (value * patch.area))
     march = CircuitMarch.of(film, conductance, cell)
     return CircuitLaw(patch, conductance, march.warming, point.inlet_of(film), film.name)
 

@@ -101,17 +101,20 @@ class LumpedLink:
     other : str or None
         The other lumped node; None when ``temperature`` is given.
     temperature : float or None, [K]
+    name : str
+        Name in the heat balance, where links of one name add up; made of both ends when empty.
     """
 
     node: str
     conductance: float
     other: str | None = None
     temperature: float | None = None
+    name: str = ""
 
     @property
     def label(self) -> str:
         """Name in the heat balance."""
-        return f"{self.node}|{self.other if self.other is not None else 'surroundings'}"
+        return self.name or f"{self.node}|{self.other if self.other is not None else 'surroundings'}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -147,7 +147,15 @@ def _conduction(
         found[f"joint.{contact}"] = _padded(operators.joint_matrix(contact), size)
     for film in spec.film:
         for surface in film.surface:
+            if surface == getattr(film, "ball_row", None):
+                continue
             found[f"film.{surface}"] = _padded(operators.film_matrix(surface), size)
+    names = [name for name, _ in lumped]
+    for row in spec.wetted_rows:
+        nodes = machine.builder.ball_nodes(row.removesuffix(".balls"))
+        own = [operators.n_unknowns + names.index(node) for node in nodes]
+        area = machine.builder.facet_area[row]
+        found[f"film.{row}"] = sparse.coo_array((area, (own, own)), shape=(size, size)).tocsr()
     for index, (_, connections) in enumerate(lumped):
         for key, pieces in connections.items():
             matrix = _exchange_matrix(machine, operators.n_unknowns + index, pieces, size)

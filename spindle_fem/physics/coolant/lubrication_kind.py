@@ -28,6 +28,8 @@ class BearingStream:
         The last two of the annulus between the rings.
     axial_cosine : float, [-]
         Of the contact angle.
+    on_balls : bool
+        Or on rollers.
     """
 
     oil: Coolant
@@ -40,6 +42,7 @@ class BearingStream:
     axial_cosine: float
     inner_diameter: float
     outer_diameter: float
+    on_balls: bool = True
 
     @property
     def rpm(self) -> float:
@@ -56,6 +59,16 @@ class BearingStream:
         """Element diameter times the cosine of the contact angle over the pitch diameter, [-]."""
         return self.element_diameter * self.axial_cosine / self.pitch_diameter
 
+    @property
+    def cage_velocity(self) -> float:
+        """Of the cage at the pitch diameter, [m/s]."""
+        return 0.25 * abs(self.speed) * (1.0 - self.relative_size) * self.pitch_diameter
+
+    @property
+    def spin_velocity(self) -> float:
+        """Of an element's surface about its own axis, past what turns with the cage, [m/s]."""
+        return 0.25 * abs(self.speed) * (1.0 - self.relative_size**2) * self.pitch_diameter
+
 
 @dataclass(frozen=True, slots=True)
 class LubricationKind:
@@ -70,7 +83,7 @@ class LubricationKind:
     fill : callable
         :class:`BearingStream` to the share of the balls' path that oil fills.
     film : callable
-        :class:`BearingStream` to the film of both raceways.
+        :class:`BearingStream` to the films of both raceways and of the rolling elements.
     churns : bool
         Whether more oil is about than the contacts need, whose drag the catalogue formula ``skf`` adds from a
         diagram.
@@ -155,9 +168,11 @@ def film_harris(
 
 
 def oil_film(stream: BearingStream) -> StreamAnswer:
-    """Film and heat capacity of oil that flows through a bearing.
+    """Films and heat capacity of oil that flows through a bearing.
 
-    At rest the film of a slit that the oil just seeps through (Nu = 7.54 on twice its height).
+    At rest the film of a slit that the oil just seeps through (Nu = 7.54 on twice its height). Rolling
+    elements have that of the raceways, as Crecelius & Pirvics take it: they turn in a mixture with air, and a
+    sphere in oil alone would have some three times as much.
     """
     oil = stream.oil.properties(stream.inlet_temperature)
     viscosity, conductivity = float(oil.kinematic_viscosity), float(oil.thermal_conductivity)
@@ -166,7 +181,8 @@ def oil_film(stream: BearingStream) -> StreamAnswer:
     turning = film_harris(
         stream.rpm, viscosity, conductivity, prandtl, stream.relative_size, extrapolate=True
     )
-    velocity = 0.25 * abs(stream.speed) * (1.0 - stream.relative_size) * stream.pitch_diameter
+    velocity = stream.cage_velocity
+    coefficient = max(still, float(turning))
     faults = list(film_harris.faults(prandtl=prandtl))
     if stream.rpm:
         pitch = 1.0e3 * stream.pitch_diameter
@@ -174,7 +190,7 @@ def oil_film(stream: BearingStream) -> StreamAnswer:
         if _parker(stream) > MOST_FILL:
             faults.append(f"oil fills {_parker(stream):.2f} of the path, {MOST_FILL:g} is taken")
     return StreamAnswer(
-        coefficient=max(still, float(turning)),
+        coefficient=coefficient,
         capacity_rate=float(oil.density * oil.specific_heat_capacity) * stream.oil_flow,
         volume_flow=stream.oil_flow,
         reynolds=velocity * stream.pitch_diameter / viscosity,
@@ -184,4 +200,5 @@ def oil_film(stream: BearingStream) -> StreamAnswer:
         pressure_drop=0.0,
         source="Harris & Kotzalas",
         faults=tuple(faults),
+        element_coefficient=coefficient,
     )

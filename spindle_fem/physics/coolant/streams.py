@@ -24,6 +24,8 @@ class StreamAnswer:
         Of the film.
     faults : tuple of str
         What leaves the range of a law.
+    element_coefficient : float, [W/(m²·K)]
+        On the rolling elements that a stream through a bearing flows around; 0 where it meets none.
     """
 
     coefficient: float
@@ -36,3 +38,4 @@ class StreamAnswer:
     pressure_drop: float
     source: str
     faults: tuple[str, ...] = ()
+    element_coefficient: float = 0.0

@@ -28,6 +28,7 @@ from spindle_fem.operation.coefficients import (
     fluid_temperature,
     gap_coefficient,
     joint_conductances,
+    stream_coefficients,
 )
 from spindle_fem.physics.coolant.linear_march import outlet_stretch
 from spindle_fem.recordings.source_heat import source_heat
@@ -184,7 +185,7 @@ def solve_axisymmetric(state: MachineNetworkState) -> AxisymmetricState:
     )
     solution = splu(matrix).solve(system.load)
     field = solution[: system.n_field]
-    out = sum(float(vector @ (field - ambient)) for vector, ambient in lost)
+    out = sum(float(vector @ (solution[: len(vector)] - ambient)) for vector, ambient in lost)
     coolant = solution[machine.coolant_start - machine.n_solid + system.n_field :]
     if machine.coolant is not None:
         out += network.stream_rate * (float(coolant[-1]) - network.point.coolant_inlet_temperature)
@@ -287,16 +288,22 @@ def _stream(system: _Assembly, state: MachineNetworkState, film: StreamFilm) -> 
 
     Returns
     -------
-    What each unknown's temperature above the inlet gives to it (n_field,) [W/K], and its inlet [K].
+    What each unknown's temperature above the inlet gives to it (n,) [W/K], and its inlet [K].
     """
     inlet = film.inlet_temperature
-    value, _ = film_coefficient(film, state.network.point, np.zeros(1), inlet)
-    walls = np.zeros((system.n_field, len(film.surface)))
-    for number, surface in enumerate(film.surface):
+    values, _ = stream_coefficients(film, state.network.point)
+    machine = state.network.machine
+    walls = np.zeros((system.n, len(film.surface)))
+    for number, (surface, value) in enumerate(values.items()):
+        if surface == film.ball_row:
+            lump = system.n_field + machine.surfaces[surface].node[0] - machine.n_solid
+            walls[lump, number] = value * machine.surfaces[surface].area[0]
+            system.entry(lump, lump, walls[lump, number])
+            continue
         basis = _surface(system, surface)
-        local = np.full(basis.dx.shape, float(value[0]))
+        local = np.full(basis.dx.shape, value)
         system.add(_exchange.assemble(basis, h=local))
-        walls[:, number] = _supply.assemble(basis, q=local)
+        walls[: system.n_field, number] = _supply.assemble(basis, q=local)
     conductance = walls.sum(axis=0)
     warming = CircuitMarch.of(film, conductance, wall_cells(film)).warming
     wetted = np.flatnonzero(walls.any(axis=1))
@@ -304,7 +311,7 @@ def _stream(system: _Assembly, state: MachineNetworkState, film: StreamFilm) -> 
     system.rows.append(np.repeat(wetted, len(wetted)))
     system.columns.append(np.tile(wetted, len(wetted)))
     system.values.append(-between.ravel())
-    system.load[: system.n_field] += inlet * (walls @ (1.0 - warming.sum(axis=1)))
+    system.load += inlet * (walls @ (1.0 - warming.sum(axis=1)))
     return walls @ (1.0 - conductance @ warming / conductance), inlet
 
 

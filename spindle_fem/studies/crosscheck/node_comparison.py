@@ -174,6 +174,10 @@ def _surface_flows(prepared, coupled, machine, add) -> None:
     stream_of = {name: film.name for film in machine.spec.circuits for name in film.surface}
     wetted = set(prepared.builder.cells.surfaces) if prepared.builder.cells is not None else set()
     for surface, film in coupled.loads.films.items():
+        if surface in machine.spec.wetted_rows:
+            node, taker = machine.ball_nodes[surface.removesuffix(".balls")], stream_of[surface]
+            add(node, taker, taker, coupled.solution.balance.films[surface], taker)
+            continue
         rows = operators.surface_rows[surface]
         heat = film.coefficient * (
             operators.facet_integral(temperature, rows) - film.temperature * operators.facet_area[rows]
