@@ -63,7 +63,8 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
     """Headline of a run: temperatures, bearings, balance, checks and warnings."""
     console = open_console()
     table = headed_table(
-        "Bearings", "", "heat W", "inner °C", "outer °C", "balls °C", "difference K", "preload N", "lambda"
+        *("Bearings", "", "heat W", "inner °C", "outer °C", "balls °C", "difference K"),
+        *("preload N", "axial load N", "lambda"),
     )
     for name, bearing in summary["bearings"].items():
         table.add_row(
@@ -74,6 +75,7 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
             _number(bearing["temperature_ball_degC"], 2),
             _number(bearing["ring_difference_K"], 2),
             _number(bearing["preload_N"], 0),
+            _number(bearing["axial_load_N"], 0),
             _number(bearing["lambda"], 1),
         )
     console.print(table)

@@ -135,6 +135,7 @@ def bearing_table(summary: Mapping[str, Any]) -> Table:
         ("contact_angle_inner_deg", "contact angle inner / °", 1),
         ("contact_angle_outer_deg", "contact angle outer / °", 1),
         ("preload_N", "preload / N", 0),
+        ("axial_load_N", "axial load / N", 0),
         ("film_um", "film / µm", 2),
         ("lambda", "lambda", 1),
     )
@@ -142,7 +143,10 @@ def bearing_table(summary: Mapping[str, Any]) -> Table:
         words("bearing", itemgetter(0)),
         *(fixed(title, lambda item, key=key: item[1].get(key), digits) for key, title, digits in columns),
     )
-    caption = "Heat, temperatures and state of each bearing."
+    caption = (
+        "Heat, temperatures and state of each bearing. The axial load is its share of preload, thrust and "
+        "the springs of other sets; a set that nothing but those presses on has no preload of its own."
+    )
     return table_of(fields, summary["bearings"].items(), caption)
 
 

@@ -236,6 +236,7 @@ _BEARING_FIELDS = (
     ("contact_angle_inner", "degree", "contact angle at the inner raceway", 180.0 / np.pi),
     ("contact_angle_outer", "degree", "contact angle at the outer raceway", 180.0 / np.pi),
     ("preload", "N", "axial force between the rings", 1.0),
+    ("axial_load", "N", "axial force with the external load", 1.0),
     ("film_thickness", "um", "central lubricant film, thinner contact", 1.0e6),
     ("film_thickness_ratio", "1", "film thickness over combined roughness (lambda)", 1.0),
 )

@@ -53,6 +53,13 @@ def test_cells_of_a_circuit_are_one_line_and_one_band():
     assert len(bands) == 1 + 3
 
 
+def test_a_bearing_without_preload_shows_what_it_carries():
+    states = {"F1": {"heat_W": 20.0, "preload_N": None, "axial_load_N": 183.4}}
+    table = run_tables.bearing_table({"bearings": states})
+    shown = dict(zip([item["title"] for item in table.columns], table.rows[0]["cells"], strict=True))
+    assert (shown["preload / N"], shown["axial load / N"]) == (MISSING, "183")
+
+
 def test_a_ring_without_a_fit_has_no_pressure_and_no_gap():
     names = ("F1", "R1")
     summary = {

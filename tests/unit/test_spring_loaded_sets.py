@@ -134,6 +134,18 @@ def test_springs_of_the_rear_seat_the_rings_of_a_front_pair_in_tandem():
     assert states(spec)["F1"].axial_force == pytest.approx(100.0, rel=1e-6)
 
 
+def test_a_pair_in_tandem_that_others_press_on_shares_their_force_and_has_no_preload():
+    thrust, different = 250.0, "bearing_set.front.bearing.F2.bearing_type=7014 AC"
+    spec = load_machine("motor_spindle", [*TANDEM, *FACING, f"operation.thrust={thrust} N", different])
+    warm = {bearing.name: BearingTemperatures(*(313.15,) * 5) for _, bearing in spec.bearings}
+    found, _ = BearingMechanics(spec)(OperatingPoint.of(spec), warm)
+    loads = [found[name].axial_load for name in ("F1", "F2")]
+    assert sum(loads) == pytest.approx(thrust + 200.0, rel=1e-6)
+    # the steeper contacts of the second take more of it
+    assert loads[1] > 1.2 * loads[0] > 0.0
+    assert math.isnan(found["F1"].preload)
+
+
 @pytest.mark.parametrize(("thrust", "sound"), [("0 N", False), ("-50 N", False), ("50 N", True)])
 def test_check_refuses_a_shaft_that_nothing_holds(thrust, sound):
     changes = [*FACING, f"operation.thrust={thrust}"]
