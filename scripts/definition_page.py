@@ -131,7 +131,8 @@ was taken (`assumed`).
 - contacts that no `[[joint]]` covers join `workshop_inner_seats` (10000 W/(m²·K)), `workshop_outer_seats`
   (4000), `workshop_turning_seats` (8000), `workshop_standing_seats` (4000) or `workshop_clamped_faces`
   (8000), each with 30 or 40 %;
-- faces that no `[[surface]]` names and that see the room from outside lose heat by natural convection and
+- faces that no `[[surface]]` names and that see the room from outside (`workshop_PART_cylinder`,
+  `workshop_PART_plane_front` and `workshop_PART_plane_rear`) lose heat by natural convection and
   radiation (emissivity 0.6) where they stand, by `becker` and `disc` where they turn;
 - a turning cylinder within 5 mm of a standing one is a gap by `becker_kaye`;
 - what is left is adiabatic.

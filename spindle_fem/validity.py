@@ -97,7 +97,7 @@ def range_text(lowest: float, highest: float) -> str:
     return f"above 0, at most {highest:.6g}" if above_zero else f"{lowest:.6g} to {highest:.6g}"
 
 
-# Warnings that change the result, then those of harm to the machine; other warnings follow.
+# Warnings that change the result, those of harm to the machine, laws that disagree; other warnings follow.
 CHANGES_RESULT = (
     "no_equilibrium",
     "thermal_preload_omitted",
@@ -105,6 +105,7 @@ CHANGES_RESULT = (
     "coolant_flow_limited",
     "balls_unloaded",
     "no_heat_to_air",
+    "gap_without_exchange",
 )
 _HARMS = (
     "grease_temperature",
@@ -118,6 +119,7 @@ _HARMS = (
     "film_not_separating",
     "boundary_lubrication",
 )
+_UNSURE = ("film_uncertain",)
 _NOTES = ("mesh_note", "geometry_note")
 
 
@@ -128,7 +130,7 @@ def by_consequence(warnings: Iterable[CodedWarning]) -> tuple[CodedWarning, ...]
     >>> [item.code for item in by_consequence(given)]
     ['no_equilibrium', 'mesh_note']
     """
-    first = (*CHANGES_RESULT, *_HARMS)
+    first = (*CHANGES_RESULT, *_HARMS, *_UNSURE)
     rank = {code: place for place, code in enumerate(first)} | dict.fromkeys(_NOTES, len(first) + 1)
     return tuple(sorted(warnings, key=lambda item: rank.get(item.code, len(first))))
 

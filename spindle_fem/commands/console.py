@@ -91,7 +91,7 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
             f"{coolant['inlet_degC']:.2f} → {coolant['outlet_degC']:.2f} °C, {coolant['regime']}, "
             f"Re {coolant['reynolds']:.0f}, "
             f"film {film['value']:.0f} ({film['low']:.0f}–{film['high']:.0f}) W/(m²·K), "
-            f"pressure drop {coolant['pressure_drop_Pa'] / 1e5:.2f} bar"
+            f"pressure drop {coolant['pressure_drop_Pa'] / 1e5:.2f} bar{_in_ports(coolant)}"
         )
     for name, circuit in summary["circuits"].items():
         console.print(
@@ -119,6 +119,12 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
             )
     _print_warnings(console, {"warnings": summary["warnings"]})
     console.print(f"Report: {folder / 'report.html'}")
+
+
+def _in_ports(coolant: Mapping[str, Any]) -> str:
+    """Share of the drillings in the pressure drop; nothing of channels without."""
+    ports = coolant["ports_pressure_drop_Pa"]
+    return f", {ports / 1e5:.2f} of it in the ports" if ports else ""
 
 
 def _time_split(times: Mapping[str, float]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -16,7 +15,6 @@ from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
     from spindle_fem.definition.effect_entries import EffectEntry
-    from spindle_fem.definition.machine_spec import BearingSet, HeatSource, MachineSpec
     from spindle_fem.units import Uncertain
 
 
@@ -105,9 +103,10 @@ def check_machine(
     Returns
     -------
     dict
-        ``machine``, ``parts``, ``surfaces``, ``contacts``, ``probes``,
-        ``sources``, ``bearing_sets`` (with the preload that a class means), ``circuits``,
-        ``displacement_sensors``, ``radial_loads`` (of bearing sets), ``effects``, ``assumed``
+        ``machine``, ``operation``, ``parts``, ``surfaces``, ``adiabatic`` (faces without heat
+        exchange), ``contacts``, ``probes``, ``sources``, ``bearing_sets`` (with the preload that a class
+        means), ``channel``, ``circuits``, ``displacement_sensors``, ``radial_loads`` (of bearing sets),
+        ``effects``, ``assumed``
         (what rules gave that the file leaves out), ``warnings``; of a ``[network]`` machine ``machine``,
         ``nodes``, ``boundaries``, ``links``, ``sources``, ``effects``,
         ``warnings``.
@@ -116,11 +115,12 @@ def check_machine(
     ------
     FaultsError
     """
+    from spindle_fem.commands.machine_contents import contents_of
     from spindle_fem.definition.load import examine_machine, find_machine, read_definition
     from spindle_fem.definition.network_load import is_network_machine
     from spindle_fem.machine.geometry.assembly import build_assembly
-    from spindle_fem.machine.geometry.joint_groups import group_of_contacts
     from spindle_fem.operation.driven_flow import flow_warnings
+    from spindle_fem.operation.open_gaps import heated_gaps_without_exchange
     from spindle_fem.operation.operating_limits import lost_to_air, speeds_beyond_catalogues
 
     if picture is not None and picture.suffix != ".png":
@@ -139,42 +139,16 @@ def check_machine(
         from spindle_fem.report.definition_picture import draw_definition
 
         draw_definition(picture, spec)
-    said = (*flow_warnings(spec), *lost_to_air(spec), *speeds_beyond_catalogues(spec, spec.operation.speed))
     assembly = build_assembly(spec)
-    groups = group_of_contacts(spec, assembly.joint_names)
-
-    def conductance(name: str) -> str:
-        value = groups[name].conductance
-        return "perfect" if value == "perfect" else f"{groups[name].name}: {value.value:g} W/(m²·K)"
-
+    said = (
+        *flow_warnings(spec),
+        *lost_to_air(spec),
+        *heated_gaps_without_exchange(spec, assembly),
+        *speeds_beyond_catalogues(spec, spec.operation.speed),
+    )
     return {
         "machine": spec.name,
-        "operation": _operation_rows(spec),
-        "parts": [
-            {
-                "name": part.name,
-                "detail": f"{'rotating, ' if part.rotating else ''}{len(part.segments)} "
-                f"segment{'s' * (len(part.segments) > 1)}",
-            }
-            for part in assembly.parts
-        ],
-        "surfaces": [{"name": surface.name, "detail": surface.part} for surface in spec.all_surfaces],
-        "contacts": [{"name": name, "detail": conductance(name)} for name in assembly.joint_names],
-        "probes": [
-            {"name": probe.name, "detail": probe.part or probe.circuit or "mixed coolant outlet"}
-            for probe in spec.probe
-        ],
-        "sources": [{"name": source.name, "detail": _source_detail(source)} for source in spec.source],
-        "bearing_sets": [{"name": group.name, "detail": _set_detail(group)} for group in spec.bearing_set],
-        "circuits": [
-            {"name": film.name, "detail": _stream_detail(film.fluid, film.flow, film.inlet_temperature)}
-            for film in spec.film
-            if film.kind in ("circuit", "wetted")
-        ],
-        "displacement_sensors": [
-            {"name": sensor.name, "detail": sensor.direction} for sensor in spec.displacement_sensor
-        ],
-        "radial_loads": _radial_load_rows(spec),
+        **contents_of(spec, assembly),
         "effects": _effect_rows(spec.effects),
         "assumed": [
             {"name": item.where, "detail": item.rule} for item in examine_machine(machine, overrides).assumed
@@ -184,32 +158,6 @@ def check_machine(
             *({"code": "geometry_note", "text": note} for note in assembly.notes),
         ],
     }
-
-
-def _operation_rows(spec: MachineSpec) -> list[dict[str, str]]:
-    """Operating point of the machine, in customary units."""
-    point, coolant = spec.operation, spec.coolant
-    rows = {
-        "speed": f"{point.speed * 30.0 / math.pi:.6g} rpm",
-        "thrust": f"{point.thrust:.6g} N",
-        "ambient": f"{point.ambient_temperature - ZERO_CELSIUS_K:.4g} °C",
-    }
-    if coolant is not None:
-        rows["coolant"] = _stream_detail(coolant.fluid, coolant.flow, coolant.inlet_temperature)
-    return [{"name": name, "detail": detail} for name, detail in rows.items()]
-
-
-def _stream_detail(fluid: str, flow: float, inlet: float) -> str:
-    return f"{fluid}, {6e4 * flow:.4g} L/min at {inlet - ZERO_CELSIUS_K:.4g} °C"
-
-
-def _set_detail(group: BearingSet) -> str:
-    """Bearings of a set, their types and what preloads them."""
-    types = ", ".join(dict.fromkeys(map(group.type_name, group.bearing)))
-    names = ", ".join(bearing.name for bearing in group.bearing)
-    rollers = group.bearing[0].takes_thrust is None
-    preload = "" if rollers else f", preload {group.preload:.4g} N ({group.preload_kind})"
-    return f"{names}: {types}{preload}{', carries thrust' if group.carries_thrust else ''}"
 
 
 def mesh_machine(machine: str | Path, file: Path, *, overrides: Iterable[str] = ()) -> dict[str, Any]:
@@ -279,13 +227,6 @@ def _check_network(machine: str | Path, overrides: Iterable[str]) -> dict[str, A
     }
 
 
-def _radial_load_rows(spec: MachineSpec) -> list[dict[str, str]]:
-    from spindle_fem.operation.radial_loads import radial_loads
-
-    loads = radial_loads(spec) if spec.radial_load else {}
-    return [{"name": name, "detail": f"{force:.0f} N"} for name, force in loads.items()]
-
-
 def _draw_faults(picture: Path, machine: str | Path, overrides: Iterable[str], error: FaultsError) -> None:
     """Picture of what is sound in a faulty definition."""
     from spindle_fem.definition.load import examine_machine
@@ -295,13 +236,6 @@ def _draw_faults(picture: Path, machine: str | Path, overrides: Iterable[str], e
     with contextlib.suppress(FaultsError):  # of overrides, which are among the faults
         spec = examine_machine(machine, overrides).spec
     draw_definition(picture, spec, error.faults)
-
-
-def _source_detail(source: HeatSource) -> str:
-    heat = "no heat of its own" if source.heat is None else "heat by a table"
-    if isinstance(source.heat, float):
-        heat = f"{source.heat:g} W"
-    return f"{heat} into {source.place}" + (f', follows "{source.input}"' if source.input else "")
 
 
 def _amount(value: Uncertain, unit: str, zero: float = 0.0) -> str:

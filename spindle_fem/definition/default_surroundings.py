@@ -194,7 +194,7 @@ def _gaps(content: dict[str, Any], drawn: _Drawn) -> Iterator[tuple[str, str]]:
 
 def _films(content: dict[str, Any], drawn: _Drawn) -> Iterator[tuple[str, str]]:
     names = drawn.meridian.part_names
-    groups: dict[tuple[int, str, int], list[Piece]] = {}
+    groups: dict[tuple[int, str, str, int], list[Piece]] = {}
     for piece in drawn.unnamed:
         part = max(piece.below, piece.above)
         inward = piece.kind == "cylinder" and piece.below == VOID
@@ -203,12 +203,15 @@ def _films(content: dict[str, Any], drawn: _Drawn) -> Iterator[tuple[str, str]]:
         turns = drawn.rotating[part]
         # Films of rotating cylinders depend on their diameter; films of still air hardly depend on size.
         radius = piece.r[1] if turns and piece.kind == "cylinder" else 0
-        groups.setdefault((part, piece.kind, radius), []).append(piece)
+        # The two ends of a part are far apart and seldom equally warm.
+        end = piece.facing(piece.above == VOID) if piece.kind == "plane" else ""
+        groups.setdefault((part, piece.kind, end, radius), []).append(piece)
     made: dict[bool, list[str]] = {True: [], False: []}
-    for (part, kind, _), pieces in groups.items():
+    for (part, kind, end, _), pieces in groups.items():
         turns = drawn.rotating[part]
-        number = 1 + sum(name.startswith(f"film.workshop_{names[part]}_{kind}") for name in made[turns])
-        name = f"workshop_{names[part]}_{kind}" + (f"_{number}" if number > 1 else "")
+        name = f"workshop_{names[part]}_{kind}" + (f"_{end}" if end else "")
+        number = 1 + sum(other.startswith(f"film.{name}") for other in made[turns])
+        name += f"_{number}" if number > 1 else ""
         size = in_millimetres(2 * max(piece.r[1] for piece in pieces))
         film: dict[str, Any] = {"name": name, "surface": [name], "marks": "A"}
         if turns:

@@ -115,9 +115,21 @@ def headline(summary: Mapping[str, Any]) -> list[dict[str, str]]:
                 f"{number(coolant['outlet_degC'], 2)} °C",
                 f"coolant outlet, inlet {number(coolant['inlet_degC'], 1)} °C",
             ),
-            (f"{significant(coolant['pressure_drop_Pa'] / 1.0e5)} bar", "pressure drop of the channel"),
+            (f"{significant(coolant['pressure_drop_Pa'] / 1.0e5)} bar", _pressure_drop(coolant)),
         ]
     return [{"value": value, "name": name} for value, name in items]
+
+
+def _pressure_drop(coolant: Mapping[str, Any]) -> str:
+    """What takes the pressure; folders of earlier versions do not tell."""
+    ports = coolant.get("ports_pressure_drop_Pa")
+    if not ports:
+        return "pressure drop of the channel"
+    channel = coolant["pressure_drop_Pa"] - ports
+    return (
+        f"pressure drop, {significant(channel / 1.0e5)} bar of it along the channel and "
+        f"{significant(ports / 1.0e5)} bar in its ports"
+    )
 
 
 def _or_low(value: Any) -> float:
@@ -208,6 +220,7 @@ def coolant_table(coolant: Mapping[str, Any]) -> Table:
         ("film coefficient, low", significant(film["low"]), "W/(m²·K)"),
         ("film coefficient, high", significant(film["high"]), "W/(m²·K)"),
         ("pressure drop", significant(coolant["pressure_drop_Pa"] / 1.0e5), "bar"),
+        ("of it in ports", significant(coolant.get("ports_pressure_drop_Pa", math.nan) / 1.0e5), "bar"),
         ("pumping power", significant(coolant["pumping_power_W"]), "W"),
         ("hydraulic diameter", significant(coolant["hydraulic_diameter_m"] * 1.0e3, 4), "mm"),
         ("length", significant(coolant["length_m"], 4), "m"),

@@ -296,7 +296,8 @@ def _add_coolant(result: ThermalResult, variables: dict[str, Any], coordinates: 
             "mixed coolant outlet",
         ),
         ("coolant_heat", coolant.heat, "W", "heat taken up by the coolant"),
-        ("coolant_pressure_drop", coolant.pressure_drop, "Pa", "pressure drop of the channel"),
+        ("coolant_pressure_drop", coolant.pressure_drop, "Pa", "pressure drop of channel and ports"),
+        ("coolant_ports_pressure_drop", coolant.ports_pressure_drop, "Pa", "pressure drop of the ports"),
         ("coolant_pumping_power", coolant.pumping_power, "W", "flow times pressure drop"),
         ("coolant_reynolds", coolant.reynolds, "1", "Reynolds number on the hydraulic diameter at the inlet"),
     ):

@@ -163,6 +163,7 @@ def _coolant(coolant: CoolantResult) -> dict[str, Any]:
             "high": coolant.mean_film_high,
         },
         "pressure_drop_Pa": coolant.pressure_drop,
+        "ports_pressure_drop_Pa": coolant.ports_pressure_drop,
         "pumping_power_W": coolant.pumping_power,
         "wetted_area_m2": coolant.wetted_area,
         "length_m": coolant.length,

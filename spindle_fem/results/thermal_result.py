@@ -84,6 +84,7 @@ class CoolantResult:
     source: str
     in_range: bool
     pressure_drop: float
+    ports_pressure_drop: float
     pumping_power: float
     hydraulic_diameter: float
     length: float

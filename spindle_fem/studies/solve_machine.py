@@ -12,10 +12,12 @@ import numpy as np
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError
+from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.model.mesh.evaluate import probe_matrix, temperature_at_nodes
 from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperatures
 from spindle_fem.operation.circuits import stream_answer
 from spindle_fem.operation.driven_flow import channel_warnings
+from spindle_fem.operation.open_gaps import heated_gaps_without_exchange
 from spindle_fem.operation.operating_limits import lost_to_air, speeds_beyond_catalogues
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.results.thermal_result import (
@@ -41,6 +43,8 @@ from spindle_fem.validity import CodedWarning, by_consequence, fold_warnings
 
 # Between the element sizes of the two meshes of an estimate.
 REFINEMENT_RATIO = 1.5
+# Highest over lowest film of the correlations from which a result says so.
+WIDEST_BAND = 3.0
 
 
 def solve(
@@ -146,8 +150,10 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         done.append(checks.check_circuits(circuit_mismatch(machine, solution, coupled.loads)))
     if coolant is not None:
         warnings += channel_warnings(spec, coolant.flow, coolant.pressure_drop)
+        warnings += _uncertain_film(coolant)
     warnings += [
         *lost_to_air(spec),
+        *heated_gaps_without_exchange(spec, build_assembly(spec)),
         *speeds_beyond_catalogues(spec, point.speed),
         *_omitted_preload(spec, point, coupled, around),
         *fold_warnings(contact_warnings(coupled), bearings),
@@ -279,6 +285,7 @@ def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledSt
         source=march.film.source,
         in_range=bool(np.all(march.film.in_range)),
         pressure_drop=state.pressure.total,
+        ports_pressure_drop=state.pressure.ports,
         pumping_power=state.pressure.pumping_power,
         hydraulic_diameter=section.hydraulic_diameter,
         length=section.length,
@@ -294,6 +301,21 @@ def _coolant(machine: PreparedMachine, point: OperatingPoint, coupled: CoupledSt
         mean_film_low=mean(state.film_low),
         mean_film_high=mean(state.film_high),
     )
+
+
+def _uncertain_film(coolant: CoolantResult) -> Iterator[CodedWarning]:
+    """Warning of a film whose correlations lie so far apart that the walls' temperature does too."""
+    low, high = coolant.mean_film_low, coolant.mean_film_high
+    if not 0.0 < WIDEST_BAND * low < high:
+        return
+    flux = coolant.heat / coolant.wetted_area
+    above = f"{flux / coolant.mean_film_coefficient:.2g} K above the coolant"
+    text = (
+        f"Correlations of the channel's film differ {high / low:.2g}-fold, {low:.0f} to {high:.0f} W/(m²·K): "
+        f"its walls are {above} with the {coolant.mean_film_coefficient:.0f} W/(m²·K) taken, "
+        f"{flux / high:.2g} to {flux / low:.2g} K with the others."
+    )
+    yield CodedWarning("film_uncertain", text)
 
 
 def _lubricants(spec: MachineSpec, bearings: Mapping[str, BearingResult]) -> Iterator[checks.Check]:

@@ -131,6 +131,49 @@ def test_a_machine_that_loses_no_heat_to_air_is_warned_of() -> None:
     assert lost_to_air(mounted.model_copy(update={"film": tuple(still)}))
 
 
+def test_air_that_no_heat_crosses_is_warned_of_where_a_source_stands_beside_it(tmp_path) -> None:
+    text = PAGE.read_text(encoding="utf-8").replace('z = "225 mm", r = "60 mm"', 'z = "225 mm", r = "80 mm"')
+    file = tmp_path / "wide.toml"
+
+    def warned(old: str, new: str) -> list[str]:
+        assert text.count(old) == 1
+        file.write_text(text.replace(old, new), encoding="utf-8")
+        return [w["text"] for w in check_machine(file)["warnings"] if w["code"] == "gap_without_exchange"]
+
+    # The rule's own gap, a wider one, and one so wide that it is a cavity.
+    bore = 'inner_diameter = "99 mm"'
+    assert warned(bore, bore) == []
+    (said,) = warned(bore, 'inner_diameter = "112 mm"')
+    assert "the 7 mm of air between rotor (diameter 98 mm) and stator (112 mm), z 150 to 300 mm" in said
+    assert "ends at 5 mm" in said
+    assert "[[gap]]" in said
+    assert warned(bore, 'inner_diameter = "150 mm"') == []
+    assert "gap_without_exchange" in CHANGES_RESULT
+
+
+def test_ends_of_a_part_are_surfaces_of_their_own(page) -> None:
+    spec = examine(page).spec
+    ends = {edge.name: edge.z for edge in build_assembly(spec).edges if "shaft_plane" in edge.name}
+    assert ends["workshop_shaft_plane_front"] == (0.0, 0.0)
+    assert ends["workshop_shaft_plane_rear"][0] > 0.3
+    assert len(ends) == 2
+
+
+def test_what_there_is_of_channel_streams_and_bare_faces_is_listed() -> None:
+    content = check_machine(PAGE)
+    channel = {row["name"]: row["detail"] for row in content["channel"]}
+    assert channel["kind"] == "helical in housing, 7 turns of 20 mm, right hand"
+    assert channel["section"] == "12 mm wide, 8 mm deep, from r 92 mm"
+    assert float(channel["length"].removesuffix(" m")) == pytest.approx(7 * 2 * 3.1416 * 0.096, rel=2e-3)
+    bare = {row["name"]: row for row in content["adiabatic"]}
+    assert bare["F2.inner_ring"]["faces"] == ["rear z 120 mm, r 35 to 41.19 mm"]
+    assert bare["F2.inner_ring"]["area_m2"] == pytest.approx(3.14159 * (0.04119**2 - 0.035**2), rel=1e-3)
+    assert "6 faces, the largest inward r 15 mm" in bare["shaft"]["detail"]
+    sources = {row["name"]: row["detail"] for row in content["sources"]}
+    assert all("W into" in detail for detail in sources.values())
+    assert check_machine("uncooled")["channel"] == []
+
+
 def test_speeds_above_those_of_catalogues_are_warned_of() -> None:
     # 7014 C: 1.17e6 rpm mm over 90 mm are 13 000 rpm in grease, 20 800 rpm in oil
     spec = load_machine(PAGE)
