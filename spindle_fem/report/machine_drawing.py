@@ -14,6 +14,14 @@ from matplotlib.lines import Line2D
 from spindle_fem.definition.drawn_tables import element_rows
 from spindle_fem.definition.machine_spec import Channel, MachineSpec, Probe
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry, build_assembly
+from spindle_fem.report.drawn_equipment import (
+    draw_sensors,
+    draw_sources,
+    draw_streams,
+    heat_swatch,
+    sensor_spot,
+    source_legend,
+)
 from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, set_title, styled
 from spindle_fem.report.leader_labels import Label, draw_labels
 from spindle_fem.report.meridian_axes import MM, box, draw_edges, draw_elements, extent, meridian_axes
@@ -81,8 +89,9 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
     z_margin = 0.05 * (z_high - z_low)
     scale = (width_px - 2.0 * margin - 70.0) / (z_high - z_low + 2.0 * z_margin)
     legend = _film_legend(spec)
-    columns = 1 if any(len(text) > _MOST_LETTERS for _, text in legend) else 2
-    rows = math.ceil(len(legend) / columns)
+    heated = source_legend(spec)
+    columns = 1 if max(map(len, [*heated, *(text for _, text in legend)]), default=0) > _MOST_LETTERS else 2
+    rows = math.ceil((len(legend) + len(heated)) / columns)
     drawing_height = 2.0 * reach * 1.03 * scale
     top, foot = 154.0, 138.0 + 30.0 * rows + 24.0
     figure = new_figure(top + drawing_height + foot, width_px)
@@ -95,10 +104,13 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
     axes.tick_params(axis="x", length=0.0)
     for spine in ("left", "bottom"):
         axes.spines[spine].set_visible(False)
+    draw_streams(axes, spec, _film_colours(spec))
     _draw_parts(axes, assembly)
+    draw_sources(axes, spec, assembly)
     _draw_channel(axes, spec)
     _draw_bearings(axes, spec)
     _draw_films(axes, spec, assembly)
+    draw_sensors(axes, spec, assembly)
     axes.plot(
         [z_low - 0.6 * z_margin, z_high + 0.6 * z_margin],
         [0.0, 0.0],
@@ -119,15 +131,18 @@ def machine_drawing(spec: MachineSpec, assembly: AssemblyGeometry | None = None)
 
     ends = (margin, width_px - margin)
     for labels, edge, sign in (
-        (_above(spec), top - 18.0, -1.0),
+        (_above(spec, assembly), top - 18.0, -1.0),
         (_below(spec, assembly), top + drawing_height + _LABEL_DROP_PX, 1.0),
     ):
         draw_labels(head, labels, [pixels(*label.at) for label in labels], edge, sign, ends)
     _draw_scale(head, axes, lambda z: pixels(z, -1.03 * reach), ends[1])
-    for number, (colour, text) in enumerate(legend):
+    for number, (colour, text) in enumerate([*legend, *((None, text) for text in heated)]):
         column, row = divmod(number, max(rows, 1))
         x, y = margin + 10.0 + column * 0.5 * width_px, total - 24.0 - 30.0 * (rows - 1 - row)
-        head.add_line(Line2D([x, x + 44.0], [y, y], color=colour, linewidth=3.6))
+        if colour is None:
+            head.add_patch(heat_swatch(x, y))
+        else:
+            head.add_line(Line2D([x, x + 44.0], [y, y], color=colour, linewidth=3.6))
         head.text(x + 56.0, y, text, fontsize=8.8, va="center")
     return figure
 
@@ -284,6 +299,7 @@ def _film_colours(spec: MachineSpec) -> dict[str, str]:
 
 def _film_legend(spec: MachineSpec) -> list[tuple[str, str]]:
     colours = _film_colours(spec)
+    owner = {surface.name: surface.part.replace("_", " ") for surface in spec.all_surfaces}
     entries = []
     for number, film in enumerate(spec.film):
         name = film.name or f"film {number + 1}"
@@ -306,7 +322,8 @@ def _film_legend(spec: MachineSpec) -> list[tuple[str, str]]:
             if gap.rise:
                 speed = gap.reference_speed * 30.0 / math.pi
                 text = f"{gap.at_rest:g} + {gap.rise:g} (n/{speed:.0f} rpm)^{gap.exponent:g} W/(m²·K)"
-        entries.append((colours[gap.rotating], f"{gap.name.replace('_', ' ')}: {text}, shaft to housing"))
+        between = f"{owner[gap.rotating]} to {owner[gap.standing[0]]}"
+        entries.append((colours[gap.rotating], f"{gap.name.replace('_', ' ')}: {text}, {between}"))
     return entries
 
 
@@ -338,7 +355,7 @@ def _probe_place(spec: MachineSpec, probe: Probe) -> tuple[float, float, float] 
     return end, channel.inner_radius + 0.5 * channel.depth, angle
 
 
-def _above(spec: MachineSpec) -> list[Label]:
+def _above(spec: MachineSpec, assembly: AssemblyGeometry) -> list[Label]:
     labels = []
     for probe in spec.probe:
         place = _probe_place(spec, probe)
@@ -351,8 +368,9 @@ def _above(spec: MachineSpec) -> list[Label]:
         text = f"{probe.name}\nθ = {math.degrees(angle):.0f}°" if away else probe.name
         labels.append(Label(text, np.array([z * MM, side * radius * MM])))
     for sensor in spec.displacement_sensor:
-        if not isinstance(sensor.at, str):
-            labels.append(Label(sensor.name, np.array([sensor.at.z * MM, sensor.at.radius * MM])))
+        spot = sensor_spot(sensor, assembly)
+        if spot is not None:
+            labels.append(Label(sensor.name, np.array(spot)))
     for z, sign in _ports_in_plane(spec):
         if sign > 0.0:
             text = "coolant in" if abs(z - spec.channel.z_start) < 1.0e-9 else "coolant out"

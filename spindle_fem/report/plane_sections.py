@@ -109,6 +109,25 @@ def clip_triangles(shape: TriangleSet, level: NDArray[np.float64]) -> TriangleSe
     )
 
 
+def behind(shape: TriangleSet, distance: float) -> TriangleSet:
+    """Triangles of a section in x = 0, each a distance [m] larger on every side and that far behind it.
+
+    Between triangles of elements that share no edge a plane leaves cracks of rounding; these close them.
+    """
+    corners = shape.points[shape.triangles]
+    outwards = corners - corners.mean(axis=1, keepdims=True)
+    length = np.linalg.norm(outwards, axis=2, keepdims=True)
+    corners = corners + distance * outwards / np.maximum(length, 1.0e-12)
+    corners[..., 0] += distance
+    number = len(shape.triangles)
+    return TriangleSet(
+        corners.reshape(-1, 3),
+        np.arange(3 * number).reshape(number, 3),
+        shape.values[shape.triangles.ravel()],
+        shape.label,
+    )
+
+
 def section_of_volume(
     mesh: TaggedMesh, values: NDArray[np.float64], level: NDArray[np.float64], *, curved: bool = True
 ) -> TriangleSet:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.patheffects import withStroke
 from matplotlib.tri import Triangulation
 from numpy.typing import ArrayLike, NDArray
 
@@ -145,13 +146,28 @@ def largest_part(volumes: Mapping[str, float], rotating: Mapping[str, bool], *, 
     return max(candidates, key=candidates.__getitem__) if candidates else None
 
 
-def draw_field(axes: Axes, section: MeridianSection, bar: ColourBar, isotherms: ArrayLike) -> None:
+def draw_field(
+    axes: Axes, section: MeridianSection, bar: ColourBar, isotherms: ArrayLike, *, numbered: bool = False
+) -> None:
     """Temperature of a meridian section with isotherms (degC) and outlines, in mm, z across."""
     faces = section.faces
     triangles = Triangulation(faces.points[:, 2] * _MM, faces.points[:, 1] * _MM, faces.triangles)
     celsius = faces.values[:, 0] - ZERO_CELSIUS_K
     axes.tripcolor(triangles, celsius, cmap=bar.colour_map, norm=bar.norm, shading="gouraud", rasterized=True)
     if np.size(isotherms):
-        axes.tricontour(triangles, celsius, levels=isotherms, colors="white", linewidths=0.55, alpha=0.8)
+        style = {"colors": "white", "linewidths": 0.55, "alpha": 0.8}
+        if not numbered:
+            axes.tricontour(triangles, celsius, levels=isotherms, **style)
+        else:
+            # Lines that end at every element would all be numbered.
+            places = np.column_stack([triangles.x, triangles.y, celsius]).round(3)
+            points, joined = np.unique(places, axis=0, return_inverse=True)
+            corners = joined.ravel()[faces.triangles]
+            whole = np.all(corners != np.roll(corners, 1, axis=1), axis=1)
+            shape = Triangulation(*points[:, :2].T, corners[whole])
+            drawn = axes.tricontour(shape, points[:, 2], levels=isotherms, **style)
+            for number in axes.clabel(drawn, fontsize=6.5, fmt="%g", inline_spacing=2):
+                number.set(color="white", alpha=1.0, rotation=0.0)
+                number.set_path_effects([withStroke(linewidth=1.4, foreground=INK)])
     lines = section.outlines.points[..., [2, 1]] * _MM
     axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8))

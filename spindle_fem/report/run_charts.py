@@ -55,7 +55,8 @@ def meridian_temperature(result: ThermalResult, section: MeridianSection, bar: C
         "radius / mm (θ = 0 up)",
     )
     step = _isotherm_step(bar.high - bar.low)
-    draw_field(axes, section, bar, np.arange(math.ceil(bar.low / step) * step, bar.high, step))
+    isotherms = np.arange(math.ceil(bar.low / step) * step, bar.high, step)
+    draw_field(axes, section, bar, isotherms, numbered=True)
     for group, bearing in result.spec.bearings:
         colour = bar.colours(result.bearings[bearing.name].temperature_ball - ZERO_CELSIUS_K)
         for row in element_rows(bearing, result.spec.bearing_types[group.type_name(bearing)]):
@@ -76,7 +77,7 @@ def meridian_temperature(result: ThermalResult, section: MeridianSection, bar: C
     set_title(
         figure,
         "Temperature in the vertical plane through the axis",
-        f"White isotherms every {step:g} K; probes in this plane as white dots.",
+        f"White isotherms every {step:g} K, numbers in °C; probes in this plane as white dots.",
     )
     return figure
 

@@ -31,12 +31,14 @@ from spindle_fem.report.figure_style import (
 from spindle_fem.report.leader_labels import Label
 from spindle_fem.report.machine_drawing import part_colours
 from spindle_fem.report.picture_sheets import picture_figure, pictures_side_by_side
-from spindle_fem.report.plane_sections import clip_segments, clip_triangles
+from spindle_fem.report.plane_sections import behind, clip_segments, clip_triangles
 from spindle_fem.report.profiles import MeridianSection
 from spindle_fem.report.scenes import SceneRenderer, View, ball_triangles
 from spindle_fem.results.thermal_result import ThermalResult
 from spindle_fem.units import ZERO_CELSIUS_K
 
+# Of the length of a machine: a third of a pixel.
+BEHIND = 2.0e-4
 TOWARDS_HALF = (-1.0, 0.28, -0.45)
 UP = (0.0, 1.0, 0.0)
 
@@ -72,7 +74,9 @@ def add_half_machine(
     outside = exposed_triangles(result.mesh, result.temperature - ZERO_CELSIUS_K)
     # with the section closed: faces turned away are behind others
     renderer.add_coloured(clip_triangles(outside, outside.points[:, 0]), bar, closed=True)
-    renderer.add_coloured(_celsius(section.faces), bar, lit=False)
+    faces = _celsius(section.faces)
+    renderer.add_coloured(behind(faces, BEHIND * float(np.ptp(faces.points[:, 2]))), bar, lit=False)
+    renderer.add_coloured(faces, bar, lit=False)
     if result.bearings:
         renderer.add_coloured(_half_of_balls(result), bar, closed=True)
     renderer.add_lines(section.outlines)
