@@ -144,9 +144,9 @@ class DefectReport:
         text.append("rows: " + (", ".join(found) if found else "no defect"))
         longest = max((gap.end - gap.start for gap in self.gaps), default=0.0)
         text.append(
-            f"steps: {self.non_uniform_steps} not uniform, {len(self.gaps)} gaps"
+            f"steps: {self.non_uniform_steps} not uniform, {len(self.gaps)} gap{'s' * (len(self.gaps) != 1)}"
             + (f" (longest {_duration(longest)})" if self.gaps else "")
-            + f", {self.segments} segments"
+            + f", {self.segments} segment{'s' * (self.segments != 1)}"
         )
         if self.thinned is not None:
             text.append(

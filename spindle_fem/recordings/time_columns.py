@@ -13,9 +13,10 @@ from spindle_fem.recordings.numbers_in_text import numbers_of
 _DATE = r"(?P<a>\d{1,4})(?P<sign>[-./])(?P<b>\d{1,2})[-./](?P<c>\d{1,4})"
 _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<part>\d{1,9}))?)?"
 _HALF = r"\s*(?P<half>[AaPp][Mm])?"
-# Zones by the letters that stand behind stamps, of those that mean one only.
+# Zones by the letters that stand behind stamps. Those of two continents are taken for American, and said.
 _ZONES = {"Z": "+0000", "UTC": "+0000", "GMT": "+0000", "CET": "+0100", "MEZ": "+0100", "CEST": "+0200"}
 _ZONES |= {"MESZ": "+0200", "EET": "+0200", "EEST": "+0300", "EST": "-0500", "EDT": "-0400"}
+_DOUBTFUL = {"EST": "UTC+10", "EDT": "UTC+11"}
 _ZONE = rf"\s*(?P<zone>{'|'.join(_ZONES)}|[+-]\d{{2}}(?::?\d{{2}})?)?"
 _FORM = rf"^\s*(?:{_DATE})?[T ,;]*(?:{_CLOCK})?{_HALF}{_ZONE}\s*$"
 # Dates that leave no doubt which number is the month: English months, or ISO 8601 without signs between.
@@ -167,6 +168,15 @@ def _stamps(names: tuple[str, ...], column: pd.Series, zone: str | None, where: 
         possible = dated & (hour < 24)
         series = pd.to_datetime(fields.where(possible), errors="coerce").astype("datetime64[us]")
         series = series + pd.to_timedelta(fraction.where(possible, 0), unit="us")
+        doubtful = [letters for letters in _DOUBTFUL if (parts["zone"] == letters).any()]
+        if doubtful and zone is not None:
+            parts["zone"] = parts["zone"].where(~parts["zone"].isin(doubtful))
+        elif doubtful:
+            unsure += [
+                f"{name} is read as North American, UTC{int(_ZONES[name][:3])}; in Australia it is "
+                f"{_DOUBTFUL[name]} (--zone Australia/Sydney says so)"
+                for name in doubtful
+            ]
         shift = _shift_of_zone(parts["zone"])
         known = bool(parts["zone"].notna().any())
         series = series - shift

@@ -137,6 +137,14 @@ def test_stamps_may_name_their_zone(tmp_path, zone, hour):
     assert drafted.data["time"].iloc[0] == pd.Timestamp(2016, 2, 5, hour)
 
 
+@pytest.mark.parametrize(("zone", "hour", "said"), [(None, 12, True), ("Australia/Brisbane", -3, False)])
+def test_letters_of_two_continents_are_told_unless_the_zone_is_given(tmp_path, zone, hour, said):
+    rows = "".join(f"2016-02-05 07:00:{i:02d} EST,{20 + 0.1 * i:.1f},3000\n" for i in range(20))
+    drafted = draft(tmp_path, f"time,SP01 (degC),speed (rpm)\n{rows}", zone=zone)
+    assert drafted.data["time"].iloc[0] == pd.Timestamp(2016, 2, 5) + pd.Timedelta(hours=hour)
+    assert any("UTC-5; in Australia it is UTC+10" in text for text in drafted.unsure) == said
+
+
 def test_zone_resolves_the_end_of_summer_time(tmp_path):
     clock = pd.date_range("2016-10-30 00:30", periods=6, freq="30min", tz="UTC").tz_convert("Europe/Berlin")
     text = "\n".join(["time,SP01", *(f"{stamp:%Y-%m-%d %H:%M:%S},{20 + i}" for i, stamp in enumerate(clock))])
