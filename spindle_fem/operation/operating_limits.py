@@ -45,7 +45,9 @@ def require_possible_speeds(spec: MachineSpec, speeds: Iterable[float], where: s
 
 
 def require_seated_balls(spec: MachineSpec) -> None:
-    """Refuse ball bearings that all face one way and that nothing presses on as the machine turns.
+    """Refuse ball bearings that nothing presses on as the machine turns.
+
+    All of a set may face one way, or thrust towards the nose may be more than the spring of a set.
 
     Raises
     ------
@@ -57,6 +59,11 @@ def require_seated_balls(spec: MachineSpec) -> None:
     across, faults = radial_loads(spec), []
     for group in spec.bearing_set:
         if not group.faces_one_way:
+            force = spec.axial_load(group, spec.operation.thrust)
+            if group.is_sprung and force < -group.preload:
+                what = f"{group.preload:g} N of its spring are lifted off by {-force:g} N towards the nose."
+                fix = f"Allowed: above {-force:g} N, or less thrust (operation.thrust)."
+                faults.append(SpecError(f"bearing_set.{group.name}.preload", what, fix))
             continue
         takes = group.bearing[0].takes_thrust
         force = spec.axial_load(group, spec.operation.thrust)

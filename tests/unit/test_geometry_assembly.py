@@ -157,6 +157,16 @@ def test_walls_of_a_circuit_are_told_once_by_the_key_of_the_circuit(backwards):
     assert text.startswith("film.jacket.z: ")
 
 
+def test_a_wall_of_a_circuit_is_exposed_over_its_whole_length():
+    box = FaceBox("outward", (0.0, 0.14), (0.02, 0.02))
+    wall = SurfaceDefinition("jacket.1", "shaft", (box,), "film.jacket.diameter")
+    (text,) = faults_of([shaft()], [wall])
+    assert text.startswith(
+        'film.jacket.z: facing "outward", z 0 to 140 mm, r 20 mm is not all an exposed face'
+    )
+    assert "Allowed: faces that look outward: r 20 mm, z 0 to 100 mm" in text
+
+
 def test_faces_that_an_overlap_cuts_are_no_faults_of_their_own():
     surface = SurfaceDefinition("hub.bore", "hub", (FaceBox("inward", (0.0, 0.1), (0.02, 0.02)),))
     thick = PartGeometry("shaft", (AnnularSegment(0.0, 0.1, 0.0, 0.0201),))

@@ -152,6 +152,13 @@ def test_check_refuses_a_shaft_that_nothing_holds(thrust, sound):
     if sound:
         check_machine("motor_spindle", overrides=changes)
         return
+    thrown = [
+        "bearing_set.front.preload_kind=spring",
+        "bearing_set.front.preload=200N",
+        "operation.thrust=-250N",
+    ]
+    with pytest.raises(FaultsError, match=r"bearing_set\.front\.preload: 200 N of its spring .* by 250 N"):
+        check_machine("motor_spindle", overrides=thrown)
     with pytest.raises(FaultsError, match=r"bearing_set\.front\.preload: .*nothing presses them on"):
         check_machine("motor_spindle", overrides=changes)
 

@@ -6,7 +6,7 @@ Coordinates are whole nanometres, so that touching is equality.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -297,7 +297,8 @@ class MeridianMap:
                     for index, piece in enumerate(pieces)
                     if piece.is_exposed_of(part) and piece.lies_in(box)
                 ]
-                if not hits and not self._is_cut(surface.part, box):
+                whole = not surface.key or _covers([pieces[index] for index in hits], box)
+                if not (hits and whole) and not self._is_cut(surface.part, box):
                     unmatched.append((surface, number))
                 for index in hits:
                     if labels[index] not in ("", surface.name):
@@ -308,10 +309,11 @@ class MeridianMap:
             surface, number = group[0]
             box, last = surface.where[number], group[-1][0]
             ends = [] if box.z is None else sorted((*box.z, *last.where[number].z))
-            what = written[surface.name]
+            what, fails = written[surface.name], "matches no exposed face"
             places = describe_box(replace(box, z=(ends[0], ends[-1]) if ends else None))
             if surface.key:
                 what = _key_at_fault(surface, box, pieces, names.index(surface.part))
+                fails = "is not all an exposed face" if what.endswith(".z") else fails
             elif last is surface:
                 what += f", where[{number + 1}]"
             else:
@@ -319,7 +321,7 @@ class MeridianMap:
             faults.append(
                 GeometryError(
                     what,
-                    f'{places} matches no exposed face of part "{surface.part}".',
+                    f'{places} {fails} of part "{surface.part}".',
                     f"Allowed: faces that look {box.facing}: "
                     f"{list_faces(pieces, names.index(surface.part), box.facing)}.",
                 )
@@ -345,6 +347,14 @@ class MeridianMap:
                         )
                     )
         return labels
+
+
+def _covers(pieces: Iterable[Piece], box: FaceBox) -> bool:
+    """Whether cylinders fill the length of a box along the axis."""
+    if box.z is None:
+        return True
+    low, high = map(to_nanometres, box.z)
+    return sum(piece.z[1] - piece.z[0] for piece in pieces) == high - low
 
 
 def _key_at_fault(surface: SurfaceDefinition, box: FaceBox, pieces: Sequence[Piece], part: int) -> str:
