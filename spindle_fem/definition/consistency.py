@@ -266,6 +266,9 @@ def _sources(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]
             yield _unknown(f"{where}.part", source.part, "part or segment", (*declared.parts, *segments))
         if source.surface is not None and source.surface not in surfaces:
             yield _unknown(f"{where}.surface", source.surface, "surface", surfaces)
+        if source.follows_torque and spec.operation and spec.operation.load_torque is None:
+            fix = 'Give operation.torque, such as "40 N*m", or operation.power.'
+            yield SpecError(f"{where}.heat", "follows the torque, and operation has none.", fix)
 
 
 def _joints(spec: MachineSpec, declared: Declared) -> Iterator[SpindleFemError]:

@@ -48,6 +48,7 @@ from spindle_fem.definition.field_types import (
     RotationalSpeed,
     SpecModel,
     Temperature,
+    Torque,
     UncertainNumber,
     UncertainShare,
     choice_field,
@@ -84,6 +85,23 @@ class Operation(SpecModel):
     """External axial force on the shaft, positive towards the rear."""
     ambient_temperature: Temperature
     """Temperature of the air around the machine."""
+    torque: Torque | None = None
+    """Torque of the drive, for heat sources that follow it; an input that drives ``torque`` replaces it."""
+    power: Power | None = None
+    """Mechanical power of the drive in place of `torque`, which then is this over `speed`."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Operation:
+        if self.power is not None:
+            given = [(self.torque is not None, "is given beside torque.", "Allowed: one of both.")]
+            given.append((self.speed == 0.0, "is given at rest.", "Give torque instead."))
+            raise_faults([Fault("power", what, fix) for wrong, what, fix in given if wrong])
+        return self
+
+    @property
+    def load_torque(self) -> float | None:
+        """Torque of the drive, N m; None where the operation does not say it."""
+        return self.torque if self.power is None else self.power / self.speed
 
 
 class RadialLoad(SpecModel):
@@ -324,6 +342,16 @@ class MachineSpec(SpecModel):
             self.__dict__["film"] = own + found
         return self
 
+    @model_validator(mode="after")
+    def _tell_sources(self) -> MachineSpec:
+        """Heat that follows a torque knows that of the operation."""
+        torque = self.operation.load_torque if self.operation else None
+        if torque is not None and any(source.follows_torque for source in self.source):
+            self.__dict__["source"] = tuple(
+                source.at_torque(torque) if source.follows_torque else source for source in self.source
+            )
+        return self
+
     def lubricant_of(self, group: BearingSet) -> Grease | Lubrication | None:
         """Lubricant of a set: its own oil, or the machine's grease."""
         return group.lubrication or self.grease
@@ -388,7 +416,9 @@ class MachineSpec(SpecModel):
     @property
     def source_inputs(self) -> tuple[str, ...]:
         """Recorded quantities that heat sources follow."""
-        return tuple(dict.fromkeys(source.input for source in self.source if source.input is not None))
+        torque = ("torque",) if any(source.follows_torque for source in self.source) else ()
+        named = (source.input for source in self.source if source.input is not None)
+        return tuple(dict.fromkeys((*named, *torque)))
 
     @property
     def all_surfaces(self) -> tuple[Surface, ...]:

@@ -98,6 +98,18 @@ def lost_to_air(spec: MachineSpec) -> tuple[CodedWarning, ...]:
     return (CodedWarning("no_heat_to_air", text),)
 
 
+def unused_load(spec: MachineSpec) -> tuple[CodedWarning, ...]:
+    """Warning of a torque or power of the drive that no heat follows."""
+    if spec.operation.load_torque is None or any(source.follows_torque for source in spec.source):
+        return ()
+    key = "torque" if spec.operation.power is None else "power"
+    text = (
+        f"operation.{key} has no user: no [[source]] follows the torque of the drive, by a copper_loss or "
+        "by a table with torque."
+    )
+    return (CodedWarning("load_unused", text),)
+
+
 def speeds_beyond_catalogues(spec: MachineSpec, speed: float) -> tuple[CodedWarning, ...]:
     """Warning of bearings that are faster at a speed [rad/s] than a catalogue allows single ones to be.
 

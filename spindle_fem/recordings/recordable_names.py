@@ -55,6 +55,7 @@ def recordable_names(machine: str | Path, overrides: Iterable[str] = ()) -> Reco
     heat = {f"heat.{source.name}": "W" for source in spec.source}
     # without a gain the input is the heat itself
     heat |= {source.input: "W" if source.gain is None else "" for source in spec.source if source.input}
+    heat |= {"torque": "N*m"} if any(source.follows_torque for source in spec.source) else {}
     return RecordableNames(
         tuple(probe.name for probe in spec.probe),
         tuple(sensor.name for sensor in spec.displacement_sensor),

@@ -19,7 +19,8 @@ def source_heat(source: HeatSource, inputs: Mapping[str, Any]) -> Any:
     Parameters
     ----------
     inputs : mapping of str to float or (k,) ndarray
-        ``speed`` [rad/s], ``thrust`` [N] and what was recorded, SI.
+        ``speed`` [rad/s], ``thrust`` [N] and what was recorded, SI; ``torque`` [N m] where it is not that of
+        the operation.
     """
     given = inputs.get(f"heat.{source.name}")
     if given is not None:
@@ -27,18 +28,22 @@ def source_heat(source: HeatSource, inputs: Mapping[str, Any]) -> Any:
     if source.input is not None and source.input in inputs:
         gain = 1.0 if source.gain is None else source.gain.amount.value
         return gain * inputs[source.input]
+    torque = np.abs(inputs.get("torque", source.usual_torque))
+    windings = 0.0
+    if source.copper_loss is not None:
+        windings = source.copper_loss * (torque / source.rated_torque) ** 2
     if isinstance(source.heat, SourceTable):
-        return table_heat(source.heat, inputs["speed"], inputs["thrust"])
-    return source.heat or 0.0
+        loads = {"torque": torque, None: 0.0}
+        axis = source.heat.load_input
+        load = loads[axis] if axis in loads else inputs[axis]
+        return windings + _table_heat(source.heat, np.abs(inputs["speed"]), load)
+    return windings + (source.heat or 0.0)
 
 
-def table_heat(table: SourceTable, speed: Any, thrust: Any) -> Any:
-    """Heat by a table, W, linear between its entries; speed without its sign."""
-    if not table.thrust:
-        return np.interp(np.abs(speed), table.speed, table.heat)
-    rows = np.reshape(table.heat, (len(table.thrust), len(table.speed)))
-    point = [
-        np.clip(value, axis[0], axis[-1])
-        for value, axis in ((thrust, table.thrust), (np.abs(speed), table.speed))
-    ]
-    return RegularGridInterpolator((table.thrust, table.speed), rows)(tuple(point))
+def _table_heat(table: SourceTable, speed: Any, load: Any) -> Any:
+    """Heat by a table, W, linear between its entries."""
+    if not table.load:
+        return np.interp(speed, table.speed, table.heat)
+    rows, axes = np.reshape(table.heat, (len(table.load), len(table.speed))), (table.load, table.speed)
+    values = zip(np.broadcast_arrays(load, speed), axes, strict=True)
+    return RegularGridInterpolator(axes, rows)(tuple(np.clip(own, axis[0], axis[-1]) for own, axis in values))

@@ -236,7 +236,25 @@ def test_a_source_without_its_quantity_gives_what_the_definition_says(fast):
     assert [(load.input, load.gain) for load in found.powers] == [(2, 0.1), (2, 0.1)]
     table = {"speed": ["0 rpm", "1 rpm"], "heat": ["0 W", "1 W"]}
     (note,) = source_loads(with_sources(fast, {**source, "heat": table}).spec, standard).notes
-    assert "its table" in note
+    assert "its own heat" in note
+
+
+def test_windings_follow_the_torque_of_an_exported_model(fast, drive):
+    iron = {"speed": ["0 rpm", "4500 rpm"], "heat": ["0 W", "90 W"]}
+    motor = {"copper_loss": "80 W", "rated_torque": "10 N*m"}
+    heated = with_sources(
+        fast,
+        {"name": "windings", "part": "shaft", **motor},
+        {"name": "motor", "part": "housing", **motor, "heat": iron},
+    )
+    space = geometry_state_space(heated, "lumped", 4500.0 * RPM)
+    model = space.model()
+    (torque,) = (item for item in model.header["inputs"] if item["name"] == "torque")
+    assert (torque["unit"], torque["high"]) == ("N*m", 20.0)
+    loaded = with_input(drive, "torque", np.linspace(0.0, 18.0, drive.steps.size))
+    told = resolved_run(heated, loaded, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
+    found = readings_along(model, loaded, {0: START})
+    assert np.abs(found - told).max() < AGREEMENT
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from spindle_fem.errors import BadInputError
 from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
+from spindle_fem.operation.operating_limits import unused_load
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.recordings.source_heat import source_heat
 from spindle_fem.solvers.input_history import OperatingHistory
@@ -92,6 +93,81 @@ def test_a_table_is_linear_in_speed_and_thrust_and_holds_its_ends(tmp_path) -> N
     )
     found = source_heat(both, {"speed": np.array([50.0, 100.0, 50.0]), "thrust": np.array([0.0, 500.0, 2e3])})
     assert found == pytest.approx([5.0, 20.0, 15.0])
+
+
+def test_windings_follow_the_square_of_the_torque_and_iron_the_speed(tmp_path) -> None:
+    text = (
+        'copper_loss = "600 W"\nrated_torque = "40 N*m"\n'
+        'heat = {speed = ["0 rpm", "12000 rpm"], heat = ["0 W", "360 W"]}'
+    )
+    motor = table(tmp_path, text + '\n[operation]\ntorque = "20 N*m"')
+    by_hand = 600.0 * 0.25 + 360.0 * 8000.0 / 12000.0
+    assert source_heat(motor, {"speed": 8000.0 * RPM, "thrust": 0.0}) == pytest.approx(by_hand)
+    recorded = {"speed": np.full(3, 12000.0 * RPM), "thrust": 0.0, "torque": np.array([0.0, -40.0, 80.0])}
+    assert source_heat(motor, recorded) == pytest.approx([360.0, 960.0, 2760.0])
+    # 10 kW at 1500 rpm are 63.7 N m.
+    power = table(tmp_path, text + '\n[operation]\nspeed = "1500 rpm"\npower = "10 kW"')
+    torque = 10.0e3 / (1500.0 * RPM)
+    assert source_heat(power, {"speed": 0.0, "thrust": 0.0}) == pytest.approx(600.0 * (torque / 40.0) ** 2)
+
+
+def test_a_table_over_speed_and_torque_is_linear_in_both(tmp_path) -> None:
+    motor = table(
+        tmp_path,
+        'heat = {speed = ["0 rad/s", "100 rad/s"], torque = ["0 N*m", "10 N*m"], '
+        'heat = ["0 W", "20 W", "50 W", "90 W"]}\n[operation]\ntorque = "5 N*m"',
+    )
+    inputs = {"speed": np.array([0.0, 50.0, -100.0]), "thrust": 0.0}
+    assert source_heat(motor, inputs) == pytest.approx([25.0, 40.0, 55.0])
+    assert source_heat(motor, inputs | {"torque": 30.0}) == pytest.approx([50.0, 70.0, 90.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('copper_loss = "1 W"', "rated_torque: is missing"),
+        ('rated_torque = "1 N*m"\nheat = "1 W"', "copper_loss: is missing"),
+        ('copper_loss = "1 W"\nrated_torque = "4 N*m"', "motor.heat: follows the torque.*operation.torque"),
+        ('copper_loss = "1 W"\nrated_torque = "4 N"', "rated_torque"),
+        ('heat = "1 W"\n[operation]\ntorque = "1 N*m"\npower = "1 W"', "power: is given beside torque"),
+        ('heat = "1 W"\n[operation]\nspeed = "0 rpm"\npower = "1 W"', "power: is given at rest"),
+    ],
+)
+def test_a_load_that_says_too_little_or_too_much_is_refused(tmp_path, text: str, message: str) -> None:
+    with pytest.raises(BadInputError, match=message):
+        table(tmp_path, text)
+
+
+def test_a_load_that_no_heat_follows_is_warned_of(tmp_path) -> None:
+    load = '[operation]\ntorque = "10 N*m"\n'
+    (warning,) = unused_load(machine(tmp_path, load + ROTOR))
+    assert warning.code == "load_unused"
+    assert "operation.torque has no user" in warning.text
+    motor = '[[source]]\nname = "motor"\npart = "shaft"\ncopper_loss = "10 W"\nrated_torque = "5 N*m"\n'
+    assert not unused_load(machine(tmp_path, load + motor))
+    assert not unused_load(machine(tmp_path, ROTOR))
+
+
+def test_a_changed_torque_reaches_the_windings_of_every_model(tmp_path) -> None:
+    motor = '[[source]]\nname = "motor"\npart = "shaft"\ncopper_loss = "100 W"\nrated_torque = "10 N*m"\n'
+    text = '[operation]\ntorque = "10 N*m"\n' + motor
+    spec = machine(tmp_path, text, "recorded_spindle", overrides=("operation.torque=5 N*m",))
+    again = type(spec).model_validate(spec.model_dump(mode="json", by_alias=True))
+    assert again.source[0].usual_torque == spec.source[0].usual_torque == 5.0
+    state = solve_machine_network(build_machine_network(spec))
+    plain = solve_machine_network(build_machine_network(machine(tmp_path, "", "recorded_spindle")))
+    given = dict.fromkeys(("heat",), state.heat_in - plain.heat_in)
+    assert given["heat"] == pytest.approx(25.0, abs=0.5)
+    times = np.arange(0.0, 1200.0, 60.0)
+    drive = drive_of(times, np.full(times.size, 1500.0))
+    column = np.full((times.size - 1, 1), 20.0)
+    start, end = (np.hstack((values, column)) for values in (drive.start, drive.end))
+    loaded = replace(drive, names=(*drive.names, "torque"), start=start, end=end)
+    given = motor.replace('copper_loss = "100 W"\nrated_torque = "10 N*m"', 'heat = "400 W"')
+    fixed = machine(tmp_path, given, "recorded_spindle")
+    found = simulate_fast(fast_spindle(lumped_model(spec), spec), loaded, 293.15)
+    expected = simulate_fast(fast_spindle(lumped_model(fixed), fixed), drive, 293.15)
+    assert found.temperature == pytest.approx(expected.temperature, abs=1e-9)
 
 
 def test_what_is_recorded_comes_before_the_definition(tmp_path) -> None:

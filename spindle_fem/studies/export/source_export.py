@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import HeatSource, MachineSpec, SourceTable
 from spindle_fem.operation.source_terms import SOURCE_PREFIX
-from spindle_fem.recordings.source_heat import table_heat
+from spindle_fem.recordings.source_heat import source_heat
 from spindle_fem.studies.export.state_space import CELSIUS, ModelInput, PowerLoad, unit_of_input
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
+
+# Torque over the rated one up to which an exported model knows windings, and its points; between them the
+# square is straight, up to 3e-4 of the rated loss.
+TORQUE_SHARE, TORQUES = 2.0, 61
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +78,10 @@ def source_loads(spec: MachineSpec, standard: Sequence[ModelInput]) -> SourceLoa
     found = SourceLoads([], [], [], [], [])
     for number, source in enumerate(spec.source):
         name = SOURCE_PREFIX + source.name
-        if source.input is None and isinstance(source.heat, SourceTable):
-            found.tables.append(_table(f"source{number}", name, source, standard))
+        if source.input is None and (source.follows_torque or isinstance(source.heat, SourceTable)):
+            if source.follows_torque:
+                inputs.setdefault("torque", _torque(spec))
+            found.tables.append(_table(f"source{number}", name, source, inputs))
             continue
         wanted, gain = _followed(source)
         own = inputs.setdefault(wanted.name, wanted)
@@ -85,10 +91,10 @@ def source_loads(spec: MachineSpec, standard: Sequence[ModelInput]) -> SourceLoa
         offset = ZERO_CELSIUS_K if own.unit == CELSIUS else 0.0
         found.powers.append(PowerLoad(name, "W", list(inputs).index(own.name), gain, 1.0, offset))
         found.places.append(source.place)
-        if isinstance(source.heat, SourceTable):
+        if source.follows_torque or isinstance(source.heat, SourceTable):
             found.notes.append(
                 f'source "{source.name}" follows its input "{source.input}" alone; '
-                "its table, for recordings without that, is left out"
+                "its own heat, for recordings without that, is left out"
             )
     return replace(found, inputs=list(inputs.values())[len(standard) :])
 
@@ -105,22 +111,28 @@ def _followed(source: HeatSource) -> tuple[ModelInput, float]:
     return ModelInput(source.input, unit, usual / gain if gain else 0.0), gain
 
 
-def _table(key: str, load: str, source: HeatSource, inputs: Sequence[ModelInput]) -> SourceTableLoad:
-    """A table with its corners, and its ends held to those of the inputs' ranges."""
-    table = source.heat
-    entries = (table.speed, table.thrust) if table.thrust else (table.speed,)
-    ranges = [(item.low, item.high) for item in inputs[: len(entries)]]
+def _torque(spec: MachineSpec) -> ModelInput:
+    """Torque of the drive as an input of a model, up to what its sources or its operation have of it."""
+    usual = max(source.usual_torque for source in spec.source)
+    most = [usual, *(TORQUE_SHARE * (source.rated_torque or 0.0) for source in spec.source)]
+    most += [source.heat.torque[-1] for source in spec.source if getattr(source.heat, "torque", ())]
+    return ModelInput("torque", "N*m", usual, 0.0, float(max(most)), magnitude=True)
+
+
+def _table(key: str, load: str, source: HeatSource, inputs: Mapping[str, ModelInput]) -> SourceTableLoad:
+    """Own heat of a source with the corners of its table, its ends held to those of the inputs' ranges."""
+    table, entries = source.heat, {}
+    if isinstance(table, SourceTable):
+        entries = {"speed": table.speed} | ({table.load_input: table.load} if table.load else {})
+    if source.copper_loss is not None:
+        even = np.linspace(0.0, inputs["torque"].high, TORQUES)
+        entries["torque"] = np.unique([*even, *entries.get("torque", ())])
+    ranges = [(inputs[name].low, inputs[name].high) for name in entries]
     axes = tuple(
         np.unique([low, high, *(entry for entry in own if low < entry < high)])
-        for own, (low, high) in zip(entries, ranges, strict=True)
+        for own, (low, high) in zip(entries.values(), ranges, strict=True)
     )
-    grid = np.meshgrid(*axes, indexing="ij")
-    values = np.asarray(table_heat(table, grid[0].ravel(), grid[-1].ravel()))
-    return SourceTableLoad(
-        key,
-        load,
-        source.place,
-        tuple(item.name for item in inputs[: len(entries)]),
-        axes,
-        values.reshape(*grid[0].shape, 1),
-    )
+    grid = dict(zip(entries, np.meshgrid(*axes, indexing="ij"), strict=True))
+    values = source_heat(source, {name: value.ravel() for name, value in grid.items()})
+    shape = tuple(len(axis) for axis in axes)
+    return SourceTableLoad(key, load, source.place, tuple(entries), axes, values.reshape(*shape, 1))
