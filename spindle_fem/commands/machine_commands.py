@@ -121,7 +121,11 @@ def check_machine(
     from spindle_fem.machine.geometry.assembly import build_assembly
     from spindle_fem.operation.driven_flow import flow_warnings
     from spindle_fem.operation.open_gaps import heated_gaps_without_exchange
-    from spindle_fem.operation.operating_limits import lost_to_air, speeds_beyond_catalogues
+    from spindle_fem.operation.operating_limits import (
+        lost_to_air,
+        operation_warnings,
+        speeds_beyond_catalogues,
+    )
 
     if picture is not None and picture.suffix != ".png":
         raise SpecError(str(picture), f'"{picture.suffix}" is no format of pictures.', "Allowed: .png.")
@@ -143,8 +147,9 @@ def check_machine(
     said = (
         *flow_warnings(spec),
         *lost_to_air(spec),
+        *operation_warnings(spec, spec.operation.speed),
         *heated_gaps_without_exchange(spec, assembly),
-        *speeds_beyond_catalogues(spec, spec.operation.speed),
+        *speeds_beyond_catalogues(spec, max(spec.operation.speed, *(spec.operation.speed_range or (0.0,)))),
     )
     return {
         "machine": spec.name,

@@ -67,6 +67,12 @@ def _operation_rows(spec: MachineSpec) -> Iterator[dict[str, str]]:
     yield {"name": "speed", "detail": f"{point.speed * 30.0 / math.pi:.6g} rpm"}
     yield {"name": "thrust", "detail": f"{point.thrust:.6g} N"}
     yield {"name": "ambient", "detail": f"{point.ambient_temperature - ZERO_CELSIUS_K:.4g} °C"}
+    if point.speed_range is not None:
+        ends = " to ".join(f"{end * 30.0 / math.pi:.6g}" for end in point.speed_range)
+        yield {"name": "speed range", "detail": f"{ends} rpm"}
+    if point.load_torque is not None:
+        power = point.load_torque * point.speed
+        yield {"name": "torque", "detail": f"{point.load_torque:.4g} N m, {power:.4g} W"}
     if coolant is not None:
         stream = _stream_detail(coolant.fluid, coolant.flow, coolant.inlet_temperature)
         yield {"name": "coolant", "detail": stream}
@@ -137,10 +143,11 @@ def _set_detail(group: BearingSet) -> str:
 
 
 def _source_detail(source: HeatSource, spec: MachineSpec) -> str:
-    if source.heat is None:
+    value = float(source_heat(source, OperatingPoint.of(spec).inputs))
+    if source.follows_torque:
+        heat = f"{value:.4g} W by the torque"
+    elif source.heat is None:
         heat = "no heat of its own"
-    elif isinstance(source.heat, float):
-        heat = f"{source.heat:g} W"
     else:
-        heat = f"{float(source_heat(source, OperatingPoint.of(spec).inputs)):.4g} W by a table"
+        heat = f"{value:.4g} W" + ("" if isinstance(source.heat, float) else " by a table")
     return f"{heat} into {source.place}" + (f', follows "{source.input}"' if source.input else "")

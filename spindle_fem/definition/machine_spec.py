@@ -35,7 +35,6 @@ from spindle_fem.definition.field_types import (
     Angle,
     Fault,
     Flag,
-    Force,
     Fraction,
     Length,
     Name,
@@ -47,8 +46,6 @@ from spindle_fem.definition.field_types import (
     Radius,
     RotationalSpeed,
     SpecModel,
-    Temperature,
-    Torque,
     UncertainNumber,
     UncertainShare,
     choice_field,
@@ -56,6 +53,7 @@ from spindle_fem.definition.field_types import (
     raise_faults,
 )
 from spindle_fem.definition.lubrication_tables import Lubrication, LubricationFilm
+from spindle_fem.definition.operation_table import Operation
 from spindle_fem.definition.solid_tables import (
     AnnulusSegment,
     BallRow,
@@ -74,34 +72,6 @@ MACHINE_SCHEMA = "spindle-fem/machine/1"
 HeatModel = choice_field("spindle_fem.physics.bearings.heat_models")
 SizeFactor = quantity_field("", at_least=0.2, at_most=5.0)
 SigmaRel = quantity_field("", above=0.0, at_most=3.0)
-
-
-class Operation(SpecModel):
-    """Steady operating point."""
-
-    speed: RotationalSpeed
-    """Speed of the shaft."""
-    thrust: Force
-    """External axial force on the shaft, positive towards the rear."""
-    ambient_temperature: Temperature
-    """Temperature of the air around the machine."""
-    torque: Torque | None = None
-    """Torque of the drive, for heat sources that follow it; an input that drives ``torque`` replaces it."""
-    power: Power | None = None
-    """Mechanical power of the drive in place of `torque`, which then is this over `speed`."""
-
-    @model_validator(mode="after")
-    def _check(self) -> Operation:
-        if self.power is not None:
-            given = [(self.torque is not None, "is given beside torque.", "Allowed: one of both.")]
-            given.append((self.speed == 0.0, "is given at rest.", "Give torque instead."))
-            raise_faults([Fault("power", what, fix) for wrong, what, fix in given if wrong])
-        return self
-
-    @property
-    def load_torque(self) -> float | None:
-        """Torque of the drive, N m; None where the operation does not say it."""
-        return self.torque if self.power is None else self.power / self.speed
 
 
 class RadialLoad(SpecModel):
@@ -402,6 +372,13 @@ class MachineSpec(SpecModel):
         """Whether its cooling or operation is marked P: only then are the paper's questions put to it."""
         tables = (self.operation, self.channel, self.coolant)
         return any("P" in table.marks.values() for table in tables if table is not None)
+
+    @property
+    def highest_speed(self) -> float:
+        """Highest speed that operation and heat table speak of, rad/s."""
+        table = self.heat.table
+        ends = (self.operation.speed_range or (), () if table is None else table.speed)
+        return max((self.operation.speed, *(speed for end in ends for speed in end[-1:])))
 
     @property
     def circuits(self) -> tuple[StreamFilm, ...]:

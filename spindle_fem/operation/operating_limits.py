@@ -98,8 +98,22 @@ def lost_to_air(spec: MachineSpec) -> tuple[CodedWarning, ...]:
     return (CodedWarning("no_heat_to_air", text),)
 
 
-def unused_load(spec: MachineSpec) -> tuple[CodedWarning, ...]:
-    """Warning of a torque or power of the drive that no heat follows."""
+def operation_warnings(spec: MachineSpec, speed: float) -> tuple[CodedWarning, ...]:
+    """Warnings of a load that no heat follows and of a speed [rad/s] outside the machine's range."""
+    return (*_unused_load(spec), *_outside_range(spec, speed))
+
+
+def _outside_range(spec: MachineSpec, speed: float) -> tuple[CodedWarning, ...]:
+    low, high = spec.operation.speed_range or (0.0, math.inf)
+    # At rest every machine may stand.
+    if not speed or low * (1.0 - 1e-9) <= speed <= high * (1.0 + 1e-9):
+        return ()
+    rpm = [value * 30.0 / math.pi for value in (speed, low, high)]
+    text = f"{rpm[0]:.0f} rpm lie outside operation.speed_range, {rpm[1]:.0f} to {rpm[2]:.0f} rpm."
+    return (CodedWarning("speed_outside_range", text),)
+
+
+def _unused_load(spec: MachineSpec) -> tuple[CodedWarning, ...]:
     if spec.operation.load_torque is None or any(source.follows_torque for source in spec.source):
         return ()
     key = "torque" if spec.operation.power is None else "power"
@@ -137,10 +151,13 @@ def speeds_beyond_catalogues(spec: MachineSpec, speed: float) -> tuple[CodedWarn
 
 def _faults(spec: MachineSpec) -> Iterator[SpecError]:
     # A definition with other faults may lack tables.
-    try:
-        require_possible_speeds(spec, [spec.operation.speed] if spec.operation else (), "operation.speed")
-    except SpecError as fault:
-        yield fault
+    operation = spec.operation
+    speeds = {"speed": [operation.speed], "speed_range": operation.speed_range or ()} if operation else {}
+    for key, given in speeds.items():
+        try:
+            require_possible_speeds(spec, given, f"operation.{key}")
+        except SpecError as fault:
+            yield fault
     low, high = PLAUSIBLE_KELVIN
     if spec.operation and not low <= spec.operation.ambient_temperature <= high:
         yield SpecError(

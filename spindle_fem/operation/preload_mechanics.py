@@ -134,9 +134,8 @@ def _solved(spec: MachineSpec, group: BearingSet) -> PreloadResponse:
         group,
         rings + shaft,
     )
-    table = spec.heat.table
-    highest = max(HIGHEST_SPEED * spec.operation.speed, 0.0 if table is None else table.speed[-1])
-    speeds = highest * np.array(SPEED_SHARES)
+    beyond = HIGHEST_SPEED * spec.operation.speed if spec.operation.speed_range is None else 0.0
+    speeds = max(beyond, spec.highest_speed) * np.array(SPEED_SHARES)
     carries = group.carries_thrust and spec.operation.thrust != 0.0
     thrusts = np.sort(spec.operation.thrust * np.array(THRUST_SHARES if carries else (1.0,)))
     radial = mechanics.radial_loads[group.name]

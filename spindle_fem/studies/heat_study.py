@@ -117,10 +117,16 @@ def heat_study(
 
 
 def usual_speeds(spec: MachineSpec) -> tuple[float, ...]:
-    """Nine speeds in steps of a sixth of the operating speed (of 3000 rpm where it is 0), rad/s.
+    """Nine speeds over the machine's range, its ends included but rest, rad/s.
 
-    The step has two digits in rpm. Speeds that no bearing of the machine reaches are left out.
+    Without a range in steps of a sixth of the operating speed (of 3000 rpm where it is 0). Speeds between
+    have two digits in rpm; those that no bearing of the machine reaches are left out.
     """
+    if spec.operation.speed_range is not None:
+        low, high = spec.operation.speed_range
+        even = np.linspace(low, high, STEPS if low else STEPS + 1)[1:-1]
+        between = [float(f"{speed / RPM:.2g}") * RPM for speed in even.tolist()]
+        return tuple(sorted({*between, high} | ({low} if low else set())))
     step = float(f"{(spec.operation.speed / RPM or 3000.0) / STEPS_TO_OPERATION:.2g}")
     speeds = (step * number * RPM for number in range(1, STEPS + 1))
     return tuple(speed for speed in speeds if too_fast(spec, speed) is None)

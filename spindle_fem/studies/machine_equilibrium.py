@@ -15,7 +15,7 @@ from spindle_fem.validity import CodedWarning
 
 # Pa; contact pressure below which bearing steel does not tire (ISO 281:2007, 9.3.3.1).
 FATIGUE_PRESSURE = 1.5e9
-# Equilibria are followed up to this multiple of the running speed.
+# Equilibria are followed up to this multiple of the running speed, or to the end of the machine's range.
 SEARCHED_RANGE = 1.5
 
 
@@ -32,7 +32,8 @@ def equilibrium_of(
     Parameters
     ----------
     search : bool
-        Whether to look for the fold, up to half as fast again, with films and contacts of this state.
+        Whether to look for the fold, with films and contacts of this state: up to half as fast again, or to
+        the end of the machine's range of speeds where that is further.
     """
     spec = machine.spec
     assembled = assembled_preloads(spec)
@@ -41,9 +42,8 @@ def equilibrium_of(
     fold = searched = None
     limits = _limits(spec, coupled, bearings)
     if search and spec.follows_preload and point.speed > 0.0:
-        branch = equilibria_above(
-            machine, point, SEARCHED_RANGE * point.speed, coupled.loads, coupled.solution
-        )
+        end = max(SEARCHED_RANGE * point.speed, *(spec.operation.speed_range or (0.0,)))
+        branch = equilibria_above(machine, point, end, coupled.loads, coupled.solution)
         searched = branch.limit
         if branch.end == "fold":
             fold = branch.limit

@@ -18,7 +18,7 @@ from spindle_fem.operation.bearing_heat import BearingMechanics, BearingTemperat
 from spindle_fem.operation.circuits import stream_answer
 from spindle_fem.operation.driven_flow import channel_warnings
 from spindle_fem.operation.open_gaps import heated_gaps_without_exchange
-from spindle_fem.operation.operating_limits import lost_to_air, speeds_beyond_catalogues
+from spindle_fem.operation.operating_limits import lost_to_air, operation_warnings, speeds_beyond_catalogues
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.results.thermal_result import (
     BearingResult,
@@ -153,6 +153,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
         warnings += _uncertain_film(coolant)
     warnings += [
         *lost_to_air(spec),
+        *operation_warnings(spec, point.speed),
         *heated_gaps_without_exchange(spec, build_assembly(spec)),
         *speeds_beyond_catalogues(spec, point.speed),
         *_omitted_preload(spec, point, coupled, around),

@@ -13,7 +13,7 @@ from spindle_fem.errors import BadInputError
 from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
-from spindle_fem.operation.operating_limits import unused_load
+from spindle_fem.operation.operating_limits import operation_warnings
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.recordings.source_heat import source_heat
 from spindle_fem.solvers.input_history import OperatingHistory
@@ -140,12 +140,12 @@ def test_a_load_that_says_too_little_or_too_much_is_refused(tmp_path, text: str,
 
 def test_a_load_that_no_heat_follows_is_warned_of(tmp_path) -> None:
     load = '[operation]\ntorque = "10 N*m"\n'
-    (warning,) = unused_load(machine(tmp_path, load + ROTOR))
+    (warning,) = operation_warnings(machine(tmp_path, load + ROTOR), 100.0)
     assert warning.code == "load_unused"
     assert "operation.torque has no user" in warning.text
     motor = '[[source]]\nname = "motor"\npart = "shaft"\ncopper_loss = "10 W"\nrated_torque = "5 N*m"\n'
-    assert not unused_load(machine(tmp_path, load + motor))
-    assert not unused_load(machine(tmp_path, ROTOR))
+    assert not operation_warnings(machine(tmp_path, load + motor), 100.0)
+    assert not operation_warnings(machine(tmp_path, ROTOR), 100.0)
 
 
 def test_a_changed_torque_reaches_the_windings_of_every_model(tmp_path) -> None:

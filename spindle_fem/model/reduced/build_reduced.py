@@ -79,10 +79,7 @@ class ReductionOptions:
 
     def highest_speed_of(self, spec: MachineSpec) -> float:
         """Highest speed that the range holds, rad/s."""
-        if self.highest_speed is not None:
-            return self.highest_speed
-        table = spec.heat.table
-        return max(spec.operation.speed, table.speed[-1] if table is not None else 0.0)
+        return spec.highest_speed if self.highest_speed is None else self.highest_speed
 
 
 @dataclass(frozen=True, slots=True)

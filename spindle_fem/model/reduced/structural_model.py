@@ -239,8 +239,7 @@ def _samples(full: MeshModel, machine: PreparedMachine) -> list[Sample]:
     """Coefficients at the speeds that are solved."""
     spec = machine.spec
     table = build_coefficient_table(spec, full.contacts, full.gap_radii)
-    highest = max(spec.operation.speed, spec.heat.table.speed[-1] if spec.heat.table is not None else 0.0)
-    points = [replace(OperatingPoint.of(spec), speed=share * highest) for share, _ in SPEEDS]
+    points = [replace(OperatingPoint.of(spec), speed=share * spec.highest_speed) for share, _ in SPEEDS]
     return [Sample(table.base(p), nominal_channel_film(spec, full, p), table.capacities()) for p in points]
 
 
