@@ -167,6 +167,24 @@ def test_a_wall_of_a_circuit_is_exposed_over_its_whole_length():
     assert "Allowed: faces that look outward: r 20 mm, z 0 to 100 mm" in text
 
 
+def test_overlaps_that_lie_together_in_one_segment_are_one_fault():
+    bodies = [
+        shaft(),
+        PartGeometry("ring", (ring(40, 60, 20, 30),)),
+        PartGeometry("nut", (ring(58, 70, 19, 29),)),
+    ]
+    (text,) = faults_of(bodies)
+    assert text.startswith(
+        'part "nut": z 58 mm to 70 mm, r 19 mm to 29 mm overlaps parts "shaft" and "ring".'
+    )
+    apart = [
+        shaft(),
+        PartGeometry("one", (ring(0, 20, 19, 30),)),
+        PartGeometry("two", (ring(70, 90, 19, 30),)),
+    ]
+    assert [text.split('"')[1] for text in faults_of(apart)] == ["one", "two"]
+
+
 def test_faces_that_an_overlap_cuts_are_no_faults_of_their_own():
     surface = SurfaceDefinition("hub.bore", "hub", (FaceBox("inward", (0.0, 0.1), (0.02, 0.02)),))
     thick = PartGeometry("shaft", (AnnularSegment(0.0, 0.1, 0.0, 0.0201),))

@@ -24,6 +24,7 @@ from spindle_fem.machine.geometry.faces import (
     merge_pieces,
     to_nanometres,
 )
+from spindle_fem.machine.geometry.overlaps import overlap_faults, overlaps_of
 from spindle_fem.machine.geometry.part_shapes import FaceBox, PartGeometry, SurfaceDefinition
 
 # Lengths beyond which nothing is drawn, nm.
@@ -77,32 +78,19 @@ class MeridianMap:
         z_lines = np.array(sorted(z_values), dtype=np.int64)
         r_lines = np.array(sorted(r_values), dtype=np.int64)
         owner = np.full((len(z_lines) + 1, len(r_lines) + 1), VOID, dtype=np.int32)
-        overlaps: dict[tuple[int, int], list[int]] = {}
         for index, z_start, z_end, inner, outer in boxes:
             cells = (
                 slice(*(np.searchsorted(z_lines, (z_start, z_end)) + 1)),
                 slice(*(np.searchsorted(r_lines, (inner, outer)) + 1)),
             )
             block = owner[cells]
-            for other in np.unique(block[(block != VOID) & (block != index)]).tolist():
-                overlaps.setdefault((other, index), [z_start, z_end, inner, outer])
             block[block == VOID] = index
-        for (first, second), (z_start, z_end, inner, outer) in overlaps.items():
-            faults.append(
-                GeometryError(
-                    f'part "{names[second]}"',
-                    f"z {in_millimetres(z_start)} to {in_millimetres(z_end)}, r {in_millimetres(inner)} to "
-                    f'{in_millimetres(outer)} overlaps part "{names[first]}".',
-                    "Parts may touch but not overlap.",
-                )
-            )
+        regions = overlaps_of(boxes)
+        faults += overlap_faults(names, boxes, regions)
         cut: dict[str, list[tuple[int, int, int, int]]] = defaultdict(list)
-        for index, *a in boxes if overlaps else ():
-            if any(
-                index != other and a[0] < b[1] and b[0] < a[1] and a[2] < b[3] and b[2] < a[3]
-                for other, *b in boxes
-            ):
-                cut[names[index]].append(tuple(a))
+        for number in sorted({number for region in regions for number in region.boxes}):
+            index, *box = boxes[number]
+            cut[names[index]].append(tuple(box))
         return cls(names, z_lines, r_lines, owner, cut)
 
     def named_edges(
