@@ -59,6 +59,36 @@ def test_more_bearings_make_more_columns():
     assert network.n_nodes % len(network.partition.columns) == 0
 
 
+def test_spans_that_are_cooled_are_divided_about_where_that_begins_and_ends():
+    spec = load_machine("motor_spindle")
+    columns = build_machine_network(spec).partition.columns
+    edges = np.array([columns[0].z[0], *(column.z[1] for column in columns)])
+    for end in channel_zone(spec.channel):
+        at = int(np.abs(edges - end).argmin())
+        assert edges[at] == pytest.approx(end, abs=1e-12)
+        # at most one and a half bearings wide on either side, half of one at least
+        assert all(0.5 * 0.018 <= width <= 1.5 * 0.018 for width in np.diff(edges)[at - 1 : at + 1])
+    assert len({column.name for column in columns}) == len(columns) == 17
+    assert [column.bearing for column in columns if column.bearing] == ["F1", "F2", "R1", "R2"]
+    # Nothing cools the spans of a machine without coolant.
+    assert len(build_machine_network(load_machine("uncooled")).partition.columns) <= 9
+
+
+def test_rings_beside_a_channel_are_as_warm_as_of_a_fine_network():
+    """A channel that begins 15 mm behind a bearing: with one column for the whole span 12 K too hot."""
+    changes = ("heat.thermal_preload=false", "channel.z_start=135 mm", "channel.turns=9")
+    spec = load_machine("motor_spindle", changes)
+    found = []
+    for refinement in (1, 3):
+        state = solve_machine_network(build_machine_network(spec, refinement=refinement))
+        assert state.imbalance_relative < 1e-10
+        found.append(
+            [state.network.raceway_temperatures(state.temperature, b.name) for _, b in spec.bearings]
+        )
+    lumps, fine = np.array(found)
+    assert np.abs(lumps - fine).max() < 4.0
+
+
 @pytest.mark.parametrize("machine", MACHINES)
 def test_volume_and_capacity_are_those_of_the_parts(machine):
     spec = load_machine(machine)

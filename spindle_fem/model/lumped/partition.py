@@ -3,25 +3,30 @@
 Columns follow the bearings: one for each bearing, one for each spacer or span
 between bearings that is at least half a bearing wide (narrower ones go half
 and half to their neighbours), one before the first and one after the last
-bearing. In a column, nodes follow the parts from the shaft outwards; the
-thickest bodies are divided until every column has as many nodes as the
-richest, which for a bearing inside a cooled housing is eight.
+bearing. Spans that a channel or a circuit cools are divided where it begins
+and ends and finely about there; the paper's machine keeps the paper's columns.
+In a column, nodes follow the parts from the shaft outwards; the thickest
+bodies are divided until every column has as many nodes as the richest,
+which for a bearing inside a cooled housing is eight.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.definition.machine_spec import CircuitFilm, MachineSpec
 from spindle_fem.machine.geometry.assembly import AssemblyGeometry
 from spindle_fem.model.lumped.cells import MeridianCells, channel_zone
 
 NARROW_SPAN = 0.5
 SNAP = 0.35
+# Each piece of a span over the one before it, going away from where cooling begins or ends.
+GROWTH = 2.0
 SHAFT, INNER, OUTER, HOUSING = "shaft", "inner", "outer", "housing"
 
 
@@ -87,7 +92,58 @@ def build_columns(spec: MachineSpec, assembly: AssemblyGeometry) -> tuple[Column
         edge, before = end, bearing.name
     if high > edge:
         columns.append(Column("rear_end", (edge, high), None))
-    return tuple(columns)
+    if spec.is_the_papers:
+        return tuple(columns)
+    first = min(bearing.z[1] - bearing.z[0] for bearing in bearings)
+    zones = _cooled_zones(spec)
+    return tuple(piece for column in columns for piece in _divided(column, zones, first))
+
+
+def _cooled_zones(spec: MachineSpec) -> list[tuple[float, float]]:
+    """Lengths along z over which a channel or a circuit cools, m."""
+    channel = [] if spec.channel is None else [channel_zone(spec.channel)]
+    return [*channel, *(film.z for film in spec.circuits if isinstance(film, CircuitFilm))]
+
+
+def _divided(column: Column, zones: Iterable[tuple[float, float]], first: float) -> Iterator[Column]:
+    """A span that is cooled on some of its length, cut where that begins and ends, and finely about there.
+
+    Parameters
+    ----------
+    first : float, [m]
+        Width of the pieces beside a cut.
+    """
+    inside = [zone for zone in zones if _overlaps(column.z, zone)]
+    if column.bearing is not None or not inside:
+        yield column
+        return
+    edges = list(column.z)
+    for end in (end for zone in inside for end in zone):
+        if edges[0] < end < edges[-1] and min(abs(end - edge) for edge in edges) >= NARROW_SPAN * first:
+            edges = sorted([*edges, end])
+    borders = [edge for ends in pairwise(edges) for edge in _graded(*ends, first)[:-1]] + [edges[-1]]
+    for number, ends in enumerate(pairwise(borders), 1):
+        yield Column(f"{column.name}_{number}" if len(borders) > 2 else column.name, ends, None)
+
+
+def _graded(low: float, high: float, first: float) -> list[float]:
+    """Borders of pieces of about ``first`` at both ends, further ones up to twice as wide as those before.
+
+    Heat that a coolant takes leaves within some wall thicknesses from where the cooling begins.
+
+    >>> _graded(0.0, 12.0, 2.0)
+    [0.0, 2.0, 6.0, 10.0, 12.0]
+    """
+    length, widths, step = high - low, [], first
+    while 2.0 * (sum(widths) + step) <= length:
+        widths.append(step)
+        step *= GROWTH
+    left = length - 2.0 * sum(widths)
+    middle = [0.5 * left] * 2 if left > step else [left] if left > NARROW_SPAN * first else []
+    every = np.array([*widths, *middle, *widths[::-1]] or [length])
+    # A sliver in the middle goes to its neighbours.
+    every *= length / every.sum()
+    return [*(low + np.cumsum([0.0, *every])[:-1]).tolist(), high]
 
 
 def part_roles(spec: MachineSpec, assembly: AssemblyGeometry) -> dict[str, str]:
