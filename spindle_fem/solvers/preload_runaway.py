@@ -8,13 +8,13 @@ temperature.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.errors import NoSteadyStateError
+from spindle_fem.errors import NoSteadyStateError, SpindleFemError
 from spindle_fem.model.mesh.column_solver import solve_many
 from spindle_fem.model.mesh.equations import assemble_system
 from spindle_fem.model.mesh.linear_system import ThermalSystem
@@ -23,6 +23,7 @@ from spindle_fem.operation.bearing_heat import BearingTemperatures
 from spindle_fem.operation.coefficients import ball_conductances
 from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import BearingHeat, Loads
+from spindle_fem.operation.machine_loads import FieldState
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.solvers.solution_branch import Branch, follow_branch
@@ -32,10 +33,14 @@ SLOWEST = 0.05
 # Tolerance of a watt's effect on the machine, in the energy norm; it moves the fold by 3e-4 of its speed.
 RESPONSE_TOLERANCE = 1.0e-2
 RESPONSE_PRECISION = np.float32
+# Linear residual of the field that responses begin at.
+FIELD_TOLERANCE = 1.0e-6
 # Difference of two spreads over rings, as a share, that is round-off of that precision.
 SAME_SPREAD = 1.0e-5
 
 Array = NDArray[np.float64]
+# Rows around the bearings over heats and conductances of balls.
+Around = Callable[[Array, Array], Array]
 
 
 def no_equilibrium(name: str, point: OperatingPoint, reason: str) -> NoSteadyStateError:
@@ -71,6 +76,8 @@ class HeatResponse:
         Those at ambient temperature by default.
     solved : ConductionSolution, optional
         Of these loads.
+    near : ConductionSolution, optional
+        Of similar ones, from which that of these loads is found.
     """
 
     def __init__(
@@ -79,6 +86,7 @@ class HeatResponse:
         point: OperatingPoint,
         loads: Loads | None = None,
         solved: ConductionSolution | None = None,
+        near: ConductionSolution | None = None,
     ) -> None:
         self.machine = machine
         self.point = point
@@ -94,7 +102,9 @@ class HeatResponse:
         self._shares = np.array([shares["inner"], shares["outer"], shares["balls"]])
         builder, operators = machine.builder, machine.operators
         problem = machine.problem(loads)
-        solved = solved or solve_steady(problem)
+        if solved is None:
+            known = None if near is None else near.preconditioner
+            solved = solve_steady(problem, near, known, relative_tolerance=FIELD_TOLERANCE)
         system = assemble_system(problem)
         tied = system.tied()
         count = 3 * len(self.names)
@@ -121,22 +131,31 @@ class HeatResponse:
             warmed[:, column] = warmed[:, column - 2 : column] @ shares
             warmed[nodes:, column] += warmer
 
-        def around(field: Array, lumped: Array) -> Array:
-            known = dict(zip(problem.lumped_names, lumped.tolist(), strict=True))
-            found = builder.bearing_temperatures(machine.field_state(field, known))
-            return np.array([found[name].state for name in self.names])
-
-        own = solved.temperature, solved.lumped_temperature
-        heated = around(*own)
-        rises = [split_unknowns(column, n_lumped, tie) for column in warmed.T]
-        self.per_watt = np.stack(
-            [around(own[0] + field, own[1] + lumped) - heated for field, lumped in rises], axis=-1
+        self._lumped_names, self._n_lumped, self._tie = problem.lumped_names, n_lumped, tie
+        self._warmed, self._solved = warmed, solved
+        self._entered = np.array(
+            [loads.heat_to[name][body] for name in self.names for body in ("inner", "outer", "balls")]
         )
-        entered = [loads.heat_to[name][body] for name in self.names for body in ("inner", "outer", "balls")]
-        self.unheated = heated - self.per_watt @ entered
+        still = np.zeros(count)
+        heated = self._around(still)
+        self.per_watt = np.stack([self._around(watt) - heated for watt in np.eye(count)], axis=-1)
+        self.unheated = heated - self.per_watt @ self._entered
 
-    def temperatures(self, heat: Array, conductance: Array) -> dict[str, BearingTemperatures]:
-        """Temperatures at heats (n_bearings,) [W] and conductances of the balls (n_bearings, 2) [W/K]."""
+    def _unknowns(self, more: Array) -> tuple[Array, Array]:
+        """Field and lumped nodes [K] with so many watts (3 n_bearings,) more into rings and balls."""
+        field, lumped = split_unknowns(self._warmed @ more, self._n_lumped, self._tie)
+        return self._solved.temperature + field, self._solved.lumped_temperature + lumped
+
+    def _state(self, field: Array, lumped: Array) -> FieldState:
+        known = dict(zip(self._lumped_names, lumped.tolist(), strict=True))
+        return self.machine.field_state(field, known)
+
+    def _around(self, more: Array) -> Array:
+        found = self.machine.builder.bearing_temperatures(self._state(*self._unknowns(more)))
+        return np.array([found[name].state for name in self.names])
+
+    def entering(self, heat: Array, conductance: Array) -> Array:
+        """Watts (3 n_bearings,) into rings and balls: shares of the heat, and what balls conduct more."""
         entering = (heat[:, None] * self._shares).ravel()
         values = self.unheated + self.per_watt @ entering
         more = (conductance - self._base).ravel()
@@ -149,8 +168,21 @@ class HeatResponse:
         drop = (self.per_watt[:, 2:3] - self.per_watt[:, :2]).reshape(2 * count, -1)
         driving = (values[:, 2:3] - values[:, :2]).ravel()
         flow = np.linalg.solve(np.eye(2 * count) - more[:, None] * (drop @ flows), more * driving)
-        values = values + self.per_watt @ (flows @ flow)
-        return {name: BearingTemperatures.of_state(row) for name, row in zip(self.names, values, strict=True)}
+        return entering + flows @ flow
+
+    def around(self, heat: Array, conductance: Array) -> Array:
+        """Rows of ``BearingTemperatures.state`` at heats (n,) [W] and conductances of balls (n, 2) [W/K]."""
+        return self.unheated + self.per_watt @ self.entering(heat, conductance)
+
+    def at(self, state: Array, speed: float) -> HeatResponse:
+        """The response with films, oil and joints of the field that a state at a speed (rad/s) makes."""
+        count = len(self.names)
+        more = self.entering(state[:count], state[count:].reshape(count, 2)) - self._entered
+        point = replace(self.point, speed=speed)
+        field, lumped = self._unknowns(more)
+        loads, _ = self.machine.builder.at(point, self._state(field, lumped))
+        near = replace(self._solved, temperature=field, lumped_temperature=lumped)
+        return HeatResponse(self.machine, point, loads, near=near)
 
     def state(self, heats: Mapping[str, BearingHeat]) -> Array:
         """Heats and conductances of the balls, as one state (3 n_bearings,)."""
@@ -159,19 +191,52 @@ class HeatResponse:
         ]
         return np.append([heats[name].total for name in self.names], conductances)
 
-    def respond(self, states: Array, speed: float) -> Array:
-        """The states (n, 3 n_bearings) that the temperatures of states make at a speed (rad/s)."""
+    def respond(self, states: Array, speed: float, around: Around | None = None) -> Array:
+        """The states (n, 3 n_bearings) that the temperatures of states make at a speed (rad/s).
+
+        Parameters
+        ----------
+        around : callable, optional
+            In place of :meth:`around`.
+        """
         count = len(self.names)
-        around = [self.temperatures(state[:count], state[count:].reshape(count, 2)) for state in states]
+        rows = [(around or self.around)(state[:count], state[count:].reshape(count, 2)) for state in states]
+        temperatures = [
+            {n: BearingTemperatures.of_state(row) for n, row in zip(self.names, each, strict=True)}
+            for each in rows
+        ]
         heat, conductance = self.machine.builder.heat_model.heat_and_conductance(
-            replace(self.point, speed=speed), around, expand=True
+            replace(self.point, speed=speed), temperatures, expand=True
         )
         conductance[:, self._constant] = self._base[self._constant]
         return np.hstack([heat, conductance.reshape(len(states), -1)])
 
-    def follow(self, state: Array, start: float, end: float) -> Branch:
-        """The branch from a state at a speed ``start`` (rad/s)."""
-        return follow_branch(self.respond, state, start, end, weak=2 * len(self.names))
+    def follow(self, state: Array, start: float, end: float, around: Around | None = None) -> Branch:
+        """The branch from a state at a speed ``start`` (rad/s); ``around`` as of :meth:`respond`."""
+
+        def respond(states: Array, speed: float) -> Array:
+            return self.respond(states, speed, around)
+
+        return follow_branch(respond, state, start, end, weak=2 * len(self.names))
+
+    def renewed(self, branch: Branch, end: float) -> Branch:
+        """A branch to its fold with films, oil and joints that go from those given to those of the fold."""
+        count = len(self.names)
+        begin = branch.states[0]
+        heats = begin[:count].sum(), branch.top[:count].sum()
+        if branch.end != "fold" or not heats[1] > heats[0]:
+            return branch
+        try:
+            there = self.at(branch.top, branch.limit)
+        except SpindleFemError:
+            return branch
+
+        def between(heat: Array, conductance: Array) -> Array:
+            share = (heat.sum() - heats[0]) / (heats[1] - heats[0])
+            first, second = (each.around(heat, conductance) for each in (self, there))
+            return (1.0 - share) * first + share * second
+
+        return self.follow(begin, branch.parameter[0], end, between)
 
     def branch(self, end: float) -> Branch:
         """States of the bearings over the speed (rad/s), from slow running to ``end`` or a fold before.
@@ -213,7 +278,9 @@ def equilibria_above(
     Parameters
     ----------
     loads, solution
-        Of the solved state: films, oil and joints stay as they are there.
+        Of the solved state: films, oil and joints go from those there to those of the fold, linearly in the
+        heat of the bearings.
     """
     response = HeatResponse(machine, point, loads, solution)
-    return response.follow(response.state(loads.bearing_heat), point.speed, end)
+    branch = response.follow(response.state(loads.bearing_heat), point.speed, end)
+    return response.renewed(branch, end)

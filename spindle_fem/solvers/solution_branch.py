@@ -9,7 +9,7 @@ Broyden (1965), Math. Comp. 19, 577-593.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -26,6 +26,8 @@ TOLERANCE = 1.0e-6
 ON_THE_WAY = 1.0e-4
 DIFFERENCE = 1.0e-4
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.3, 1.0, 1.0e-3
+# A first step that leads over the fold is taken again in quarters, down to this.
+NEAREST_FOLD = 0.05
 MOST_CORRECTIONS = 8
 MOST_POINTS = 200
 # A point that took so many corrections has its derivatives taken anew.
@@ -47,6 +49,8 @@ class Branch:
         Whether it turned back, reached the end, or came where there is no response.
     limit : float
         Largest parameter reached.
+    top : (k,) ndarray
+        State there.
     reason : str
         Why there was no response.
     """
@@ -55,6 +59,7 @@ class Branch:
     states: Array
     end: Literal["fold", "end", "refused"]
     limit: float
+    top: Array
     reason: str = ""
 
 
@@ -152,13 +157,14 @@ class _Walk:
                 "fixed point", f"none found at {guess[-1] * self.end:g}.", "Start nearer to it."
             ) from None
         points, tangent, step, reason = [point], self.tangent(upwards), FIRST_STEP, "steps without end"
+        turned = False
         while step > SHORTEST_STEP and len(points) < MOST_POINTS:
             if points[-1][-1] + step * tangent[-1] > 1.0 and tangent[-1] > 0.0:
                 try:
                     last, _ = self.correct(
                         points[-1] + (1.0 - points[-1][-1]) / tangent[-1] * tangent, upwards
                     )
-                    return self.branch([*points, last], "end", 1.0)
+                    return self.branch([*points, last], "end", last)
                 except (_NoPointError, SpindleFemError):
                     step *= 0.5
                     continue
@@ -169,24 +175,33 @@ class _Walk:
                 continue
             points.append(point)
             if point[-1] < points[-2][-1]:
+                if len(points) == 2 and not turned:
+                    points.pop()
+                    if step > NEAREST_FOLD:
+                        # a start just below the fold: nearer points tell where it turns
+                        step *= 0.25
+                    else:
+                        # near a fold small errors of the derivatives turn the tangent round
+                        tangent, turned = (points[0] - point) / np.linalg.norm(points[0] - point), True
+                    continue
                 return self.branch(points, "fold", self.fold(points))
             if count >= REFRESHED_FROM:
                 self.differentiate(point, self.left)
             tangent = self.tangent(points[-1] - points[-2])
             step = min(LONGEST_STEP, step * (1.5 if count <= 3 else 0.7))
-        return self.branch(points, "refused", max(point[-1] for point in points), reason)
+        return self.branch(points, "refused", _highest(points), reason)
 
-    def fold(self, points: list[Array]) -> float:
-        """Largest parameter: points are added at the top of the parabola of three until it foretells them."""
+    def fold(self, points: list[Array]) -> Array:
+        """Where the parameter is largest: points are added at the top of a parabola until it foretells."""
         near = [self.nearer(point, self.tangent(points[-1] - points[-2])) for point in points[-3:]]
         if len(near) == 2:
             along = near[1] - near[0]
             try:
                 middle, _ = self.correct(0.5 * (near[0] + near[1]), along / np.linalg.norm(along))
             except (_NoPointError, SpindleFemError):
-                return float(near[0][-1])
+                return near[0]
             near.insert(1, middle)
-        best = max(point[-1] for point in near)
+        best = _highest(near)
         for _ in range(MOST_CORRECTIONS):
             along = near[-1] - near[0]
             along = along / np.linalg.norm(along)
@@ -200,13 +215,13 @@ class _Walk:
                 top, _ = self.correct(share + (place - along @ (share - near[0])) * along, along)
             except (_NoPointError, SpindleFemError):
                 break
-            best = max(best, top[-1])
+            best = _highest([best, top])
             near = sorted([*near, top], key=lambda point: float(along @ (point - near[0])))
             peak = int(np.clip(max(range(4), key=lambda i: near[i][-1]), 1, 2))
             near = near[peak - 1 : peak + 2]
-            if abs(top[-1] - np.polyval(parabola, place)) < FOLD_TOLERANCE * best:
+            if abs(top[-1] - np.polyval(parabola, place)) < FOLD_TOLERANCE * best[-1]:
                 break
-        return float(best)
+        return best
 
     def nearer(self, point: Array, along: Array) -> Array:
         """A point that only led on, as near to the branch as others; itself where that fails."""
@@ -216,7 +231,12 @@ class _Walk:
             return point
 
     def branch(
-        self, points: list[Array], end: Literal["fold", "end", "refused"], limit: float, reason: str = ""
+        self, points: list[Array], end: Literal["fold", "end", "refused"], top: Array, reason: str = ""
     ) -> Branch:
-        rows = np.array(points)
-        return Branch(rows[:, -1] * self.end, np.exp(rows[:, :-1]), end, limit * self.end, reason)
+        rows = np.array([*points, top])
+        parameter, states = rows[:, -1] * self.end, np.exp(rows[:, :-1])
+        return Branch(parameter[:-1], states[:-1], end, float(parameter[-1]), states[-1], reason)
+
+
+def _highest(points: Sequence[Array]) -> Array:
+    return max(points, key=lambda point: point[-1])

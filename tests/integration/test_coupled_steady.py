@@ -14,6 +14,7 @@ from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.coupled_steady import LINEAR_RESIDUAL_LIMIT, solve_coupled
+from spindle_fem.solvers.preload_runaway import equilibria_above
 from spindle_fem.solvers.prepared_machine import machine_on_mesh, prepare_machine, without_expansion
 from spindle_fem.studies.run_checks import require_checks
 from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared
@@ -246,6 +247,14 @@ def test_rigid_preload_runs_away_and_says_where_equilibria_end(following):
     slower = dataclasses.replace(point, speed=0.98 * fold)
     state = solve_coupled(following, slower)
     assert state.loads.bearing_heat["F2"].preload > 2000.0
+    # films, oil and joints of the fold: from a third below it comes out where it does from just below
+    found = []
+    for share in (0.67, 0.98):
+        below = dataclasses.replace(point, speed=share * fold)
+        state = solve_coupled(following, below)
+        found.append(equilibria_above(following, below, 1.5 * fold, state.loads, state.solution).limit)
+    assert found[0] == pytest.approx(found[1], rel=4e-3)
+    assert found[1] == pytest.approx(fold, rel=1e-2)
 
 
 def test_spring_preload_keeps_its_force_when_the_rings_grow():

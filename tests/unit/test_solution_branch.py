@@ -75,3 +75,19 @@ def test_a_refusal_is_no_fold() -> None:
 def test_no_point_to_start_from_is_said() -> None:
     with pytest.raises(SpindleFemError, match="fixed point"):
         follow_branch(lambda x, p: 1.0 + p * x**2, np.array([1.0]), 1.0, 2.0)
+
+
+def test_a_start_just_below_the_fold_follows_derivatives_that_err() -> None:
+    """Left out of the differences, a quantity that counts turns the first tangent round."""
+
+    def respond(x: np.ndarray, p: float) -> np.ndarray:
+        first, second = x.T
+        return np.stack([1.0 + p * second**2, first], axis=-1)
+
+    start = 0.2499
+    lower = (1.0 - np.sqrt(1.0 - 4.0 * start)) / (2.0 * start)
+    for weak in (0, 1):
+        branch = follow_branch(respond, np.full(2, lower), start, 0.5, weak=weak)
+        assert branch.end == "fold"
+        assert branch.limit == pytest.approx(0.25, rel=1e-4)
+        assert branch.top == pytest.approx(2.0, rel=0.02)
