@@ -34,6 +34,7 @@ def recording_of(
 
 def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec:
     """Machine whose parts fit together; faults of its tables, geometry and effects at once."""
+    from spindle_fem.definition.bearing_seats import seat_faults
     from spindle_fem.definition.load import examine_machine
     from spindle_fem.machine.geometry.assembly import build_assembly, require_readable_geometry
     from spindle_fem.machine.geometry.joint_groups import group_of_contacts
@@ -49,7 +50,8 @@ def load_buildable(machine: str | Path, overrides: Iterable[str]) -> MachineSpec
             named |= {kind.ring_material, kind.element_material}
         # No set is assembled of faulty materials, which are already reported.
         for group in spec.bearing_set if named <= spec.materials.keys() else ():
-            assembled_set(spec, group)
+            if group.fit is None or not any(seat_faults(spec, group)):
+                assembled_set(spec, group)
 
     def has_possible_effects(spec: MachineSpec) -> None:
         if not spec.effects:

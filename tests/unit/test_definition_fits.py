@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from spindle_fem.commands.checked_machine import load_buildable
 from spindle_fem.definition.bearing_seats import followed_joint_faults, seat_diameter
 from spindle_fem.definition.exchange_tables import SeatSurface
 from spindle_fem.definition.load import load_machine
@@ -151,6 +152,13 @@ def test_bad_fits_are_refused(settings: list[str], message: str) -> None:
 def test_fits_and_preload_that_do_not_go_together_are_refused(setting: str, message: str) -> None:
     with pytest.raises(SpecError, match="bearing_set." + message):
         mechanics("bearing_set." + setting)
+
+
+def test_a_clearance_beyond_the_play_is_one_fault() -> None:
+    with pytest.raises(BadInputError) as told:
+        load_buildable("wu_tan_2016", ["bearing_set.front.fit.outer_clearance=500 um"])
+    assert "front.fit.outer_clearance: the ring has 500 µm of clearance on its seat" in str(told.value)
+    assert str(told.value).count("outer_clearance") == 1
 
 
 def test_a_perfect_joint_cannot_follow_its_fit() -> None:
