@@ -24,6 +24,7 @@ FLOORS = (
     "parallel",
     "machine.geometry.part_shapes",
     "machine.geometry.faces",
+    "machine.geometry.overlaps",
     "machine.geometry.meridian",
     "definition",
     "physics.bearings",
