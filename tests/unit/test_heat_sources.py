@@ -15,6 +15,7 @@ from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.operating_limits import operation_warnings
 from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.recordings.recordable_names import recordable_names
 from spindle_fem.recordings.source_heat import source_heat
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
@@ -226,6 +227,19 @@ def test_the_full_model_knows_the_inputs_that_sources_follow(tmp_path) -> None:
     assert history.at(0.5).inputs["motor_power"] == 1.0
     assert source_heat(spec.source[0], history.at(0.5).inputs) == 1.0
     with pytest.raises(BadInputError, match="motor_power"):
+        OperatingHistory.of(load_machine("small_two_start"), inputs)
+
+
+def test_recordings_may_drive_the_torque_of_windings(tmp_path) -> None:
+    motor = '[[source]]\nname = "motor"\npart = "shaft"\ncopper_loss = "100 W"\nrated_torque = "10 N*m"\n'
+    spec = machine(tmp_path, '[operation]\ntorque = "10 N*m"\n' + motor)
+    assert recordable_names(tmp_path / "machine.toml").inputs["torque"] == "N*m"
+    inputs = InputHistory(
+        np.array([0.0, 1.0]), ("speed", "torque"), np.array([[1.0, 0.0], [1.0, 8.0]]), np.zeros(2, dtype=bool)
+    )
+    halfway = OperatingHistory.of(spec, inputs).at(0.5)
+    assert source_heat(spec.source[0], halfway.inputs) == pytest.approx(16.0)
+    with pytest.raises(BadInputError, match="torque"):
         OperatingHistory.of(load_machine("small_two_start"), inputs)
 
 
