@@ -427,6 +427,7 @@ class BearingMechanics:
                 contact_angle_outer=state.contact_angle_outer,
                 preload=state.preload,
                 axial_load=state.axial_force,
+                axial_stiffness=state.axial_stiffness,
                 film_thickness=state.thinnest_film,
                 film_thickness_ratio=state.smallest_film_ratio,
                 conductance_inner=path.inner,

@@ -47,10 +47,10 @@ class LumpedLoad:
 class BearingHeat:
     """Friction heat of one bearing and what its contacts conduct.
 
-    Angles in rad; ``preload`` in N is the axial force at this state without the
-    external load, ``axial_load`` with it; film in m; ``nan`` where a heat model does not give them.
-    ``conductance_inner`` and ``conductance_outer`` (W/K) join the balls to
-    each raceway and are ``nan`` where the model has no contacts. ``contact_pressure`` (Pa) is the largest
+    Angles in rad; ``preload`` in N is the axial force at this state without the external load,
+    ``axial_load`` with it, ``axial_stiffness`` (N/m) that of its set; film in m; ``nan`` where a heat model
+    does not give them. ``conductance_inner`` and ``conductance_outer`` (W/K) join the balls to each raceway
+    and are ``nan`` where the model has no contacts. ``contact_pressure`` (Pa) is the largest
     between ball and raceway; ``seat_pressure`` (Pa) and ``seat_gap`` (m, radial) are those of the inner
     and the outer ring, None where no elastic bodies carry them.
     """
@@ -61,6 +61,7 @@ class BearingHeat:
     contact_angle_outer: float = float("nan")
     preload: float = float("nan")
     axial_load: float = float("nan")
+    axial_stiffness: float = float("nan")
     film_thickness: float = float("nan")
     film_thickness_ratio: float = float("nan")
     conductance_inner: float = float("nan")

@@ -237,6 +237,7 @@ _BEARING_FIELDS = (
     ("contact_angle_outer", "degree", "contact angle at the outer raceway", 180.0 / np.pi),
     ("preload", "N", "axial force between the rings", 1.0),
     ("axial_load", "N", "axial force with the external load", 1.0),
+    ("axial_stiffness", "N/um", "axial stiffness of the bearing's set", 1.0e-6),
     ("film_thickness", "um", "central lubricant film, thinner contact", 1.0e6),
     ("film_thickness_ratio", "1", "film thickness over combined roughness (lambda)", 1.0),
 )

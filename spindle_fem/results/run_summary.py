@@ -138,6 +138,7 @@ def _bearing(bearing: BearingResult) -> dict[str, Any]:
         "contact_angle_outer_deg": math.degrees(bearing.contact_angle_outer),
         "preload_N": bearing.preload,
         "axial_load_N": bearing.axial_load,
+        "axial_stiffness_N_um": bearing.axial_stiffness * 1e-6,
         "film_um": bearing.film_thickness * 1e6,
         "lambda": bearing.film_thickness_ratio,
         "contact_pressure_GPa": bearing.contact_pressure * 1e-9,

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 class BearingResult:
     """State of one bearing at the solution; temperatures in K.
 
-    ``contact_angle_*`` in rad, ``film_thickness`` (central, thinner contact)
-    in m; ``contact_pressure`` (largest) in Pa; ``preload`` is the axial force without
-    external load, ``axial_load`` with it; ``nan`` where the heat model does not give them.
+    ``contact_angle_*`` in rad, ``film_thickness`` (central, thinner contact) in m; ``contact_pressure``
+    (largest) in Pa; ``preload`` is the axial force without external load, ``axial_load`` with it,
+    ``axial_stiffness`` (N/m) that of its set; ``nan`` where the heat model does not give them.
     """
 
     heat: float
@@ -47,6 +47,7 @@ class BearingResult:
     film_thickness_ratio: float
     contact_pressure: float = float("nan")
     axial_load: float = float("nan")
+    axial_stiffness: float = float("nan")
 
     @property
     def ring_difference(self) -> float:

@@ -215,6 +215,7 @@ def _bearings(coupled: CoupledState, around: Mapping[str, BearingTemperatures]) 
             film_thickness_ratio=heat.film_thickness_ratio,
             contact_pressure=heat.contact_pressure,
             axial_load=heat.axial_load,
+            axial_stiffness=heat.axial_stiffness,
         )
     return found
 

@@ -157,6 +157,10 @@ def test_limits_take_their_unit():
 def test_growth_and_preload_are_outputs_of_full_solves():
     paths = output_paths(load_machine("wu_tan_2016"))
     assert {"growth.nose_axial_um", "growth.nose_tilt_up_urad", "equilibrium.preload_ratio.F3"} <= set(paths)
+    stiffness = "bearings.F3.axial_stiffness_N_um"
+    assert stiffness in paths
+    assert only_full(stiffness)
+    assert limit_of("150 N/um", stiffness, "constraint[1].min") == pytest.approx(150.0)
     assert limit_of("50 um", "growth.nose_axial_um", "constraint[1].max") == pytest.approx(50.0)
     assert limit_of("0.1 mrad", "growth.nose_tilt_up_urad", "constraint[1].max") == pytest.approx(100.0)
     assert only_full("growth.nose_axial_um")

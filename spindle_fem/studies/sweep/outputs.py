@@ -39,6 +39,7 @@ _PURE = OutputUnit("", "")
 _CELSIUS = OutputUnit("°C", "K", "temperature", lambda kelvin: kelvin - ZERO_CELSIUS_K)
 # Endings of the summary's keys, longest first.
 _ENDINGS: dict[str, OutputUnit] = {
+    "_N_um": OutputUnit("N/µm", "N/m", from_si=lambda stiffness: 1e-6 * stiffness),
     "_W_m2K": OutputUnit("W/(m²·K)", "W/m**2/K"),
     "_K_per_m": OutputUnit("K/m", "K/m"),
     "_m3_s": OutputUnit("m³/s", "m**3/s"),
@@ -83,6 +84,8 @@ _OF_BEARINGS = (
 COOLER_HEAT = "derived.cooler_heat_W"
 # How the nose bends aside, where a machine has two sets of bearings.
 _NOSE_ASIDE = ("radial_up_um", "radial_across_um", "tilt_up_urad", "tilt_across_urad")
+# Of each bearing's set; only full solves have it.
+STIFFNESS = ".axial_stiffness_N_um"
 # Summary blocks, and one number, that only a solve of the whole field has.
 _ONLY_FULL = ("circuits.", "growth.", "displacements.", "equilibrium.", "energy.imbalance_relative")
 # Outputs that are words, which no limit or objective can use.
@@ -104,7 +107,7 @@ def only_full(path: str) -> bool:
     >>> only_full("growth.nose_axial_um"), only_full("probes.SP01")
     (True, False)
     """
-    return path.startswith(_ONLY_FULL)
+    return path.startswith(_ONLY_FULL) or path.endswith(STIFFNESS)
 
 
 def of_shape(path: str) -> bool:
@@ -143,6 +146,7 @@ def _paths(spec: MachineSpec) -> Iterator[str]:
     for group in spec.bearing_set:
         if group.preload > 0.0 and spec.heat.model != "table":
             yield from (f"equilibrium.preload_ratio.{bearing.name}" for bearing in group.bearing)
+            yield from (f"bearings.{bearing.name}{STIFFNESS}" for bearing in group.bearing)
 
 
 def output_fault(path: str, spec: MachineSpec, where: str) -> UnknownKeyError | None:
