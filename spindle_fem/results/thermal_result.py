@@ -49,6 +49,15 @@ class BearingResult:
     axial_load: float = float("nan")
     axial_stiffness: float = float("nan")
 
+    def lubricant_temperature(self, word: str) -> float:
+        """Warmest that a lubricant, "grease" or "oil", is judged by, K.
+
+        Limits of greases are said of bearings by their rings; oil takes on the temperature of all that it
+        wets, balls or rollers too.
+        """
+        rings = (self.temperature_inner, self.temperature_outer)
+        return max(rings if word == "grease" else (*rings, self.temperature_ball))
+
     @property
     def ring_difference(self) -> float:
         """Mean inner raceway minus mean outer raceway temperature, K."""

@@ -99,10 +99,10 @@ def _limits(spec: MachineSpec, coupled: CoupledState, bearings: dict[str, Bearin
     found = [warning.text for warning in contact_warnings(coupled)]
     lubricants = {bearing.name: spec.lubricant_of(group) for group, bearing in spec.bearings}
     for name in coupled.loads.bearing_heat:
-        hottest = max(bearings[name].temperature_inner, bearings[name].temperature_outer)
         lubricant = lubricants[name]
+        word = "oil" if isinstance(lubricant, Lubrication) else "grease"
+        hottest = bearings[name].lubricant_temperature(word)
         if lubricant is not None and hottest > lubricant.temperature_limit:
             limit = lubricant.temperature_limit - 273.15
-            word = "oil" if isinstance(lubricant, Lubrication) else "grease"
             found.append(f"{name}: {word} at {hottest - 273.15:.1f} °C, above its {limit:.1f} °C.")
     return found

@@ -321,10 +321,7 @@ def _uncertain_film(coolant: CoolantResult) -> Iterator[CodedWarning]:
 
 
 def _lubricants(spec: MachineSpec, bearings: Mapping[str, BearingResult]) -> Iterator[checks.Check]:
-    """Warmest raceway of the bearings in grease, warmest raceway or balls of those in oil of each limit.
-
-    Limits of greases are said of bearings by their rings; oil takes on the temperature of all that it wets.
-    """
+    """Warmest of the bearings in grease, and of those in oil of each limit."""
     warmest: dict[tuple[str, float], dict[str, float]] = {}
     for group, bearing in spec.bearings:
         lubricant = spec.lubricant_of(group)
@@ -332,8 +329,7 @@ def _lubricants(spec: MachineSpec, bearings: Mapping[str, BearingResult]) -> Ite
             found = bearings[bearing.name]
             word = "grease" if group.lubrication is None else "oil"
             own = warmest.setdefault((word, lubricant.temperature_limit), {})
-            wetted = [found.temperature_inner, found.temperature_outer]
-            own[bearing.name] = max(wetted if word == "grease" else [*wetted, found.temperature_ball])
+            own[bearing.name] = found.lubricant_temperature(word)
     for (word, limit), temperatures in warmest.items():
         yield checks.check_lubricant(word, temperatures, limit)
 

@@ -20,6 +20,7 @@ from spindle_fem.operation.circuits import (
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment
 from spindle_fem.physics.coolant.lubrication_kind import film_harris, flooded_fill, path_fill_parker
+from spindle_fem.results.thermal_result import BearingResult
 from tests.support.oiled_machine import oiled
 
 RPM = math.pi / 30.0
@@ -193,6 +194,16 @@ def test_faults_say_what_is_allowed(tmp_path, change, fault):
     with pytest.raises(FaultsError) as raised:
         load_machine(str(oiled(tmp_path)), [change])
     assert fault in str(raised.value)
+
+
+def test_oil_is_as_warm_as_the_warmest_that_it_wets_and_grease_as_its_rings():
+    nothing = {name: float("nan") for name in ("contact_angle_inner", "contact_angle_outer", "preload")}
+    nothing |= dict.fromkeys(("film_thickness", "film_thickness_ratio"), float("nan"))
+    state = BearingResult(
+        heat=1.0, terms={}, heat_to={}, temperature_inner=350.0, temperature_outer=330.0,
+        temperature_ball=360.0, **nothing,
+    )  # fmt: skip
+    assert (state.lubricant_temperature("grease"), state.lubricant_temperature("oil")) == (350.0, 360.0)
 
 
 def test_own_oils_need_no_name():
