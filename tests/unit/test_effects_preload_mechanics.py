@@ -95,6 +95,22 @@ def test_an_even_set_shares_its_friction():
     assert 0.0 < uneven[0] < uneven[1]
 
 
+def test_friction_that_follows_load_weakly_may_still_differ_between_bearings_as_the_loads_do():
+    term = term_of(set_response())
+    at = ([293.15] * 8, [10.0, 0.0])
+
+    def share_of_the_last(exponent, unevenness):
+        own = {NAME: 0.3, "exponent_factor": exponent, "unevenness": unevenness}
+        added = term.friction(context(term, *at, **own)).real[:, 0] - 1.0
+        return added[-1] / added[0]
+
+    by_load = share_of_the_last(1.0, 1.0)
+    # (m + u d) / (m - u d) = ((m + d) / (m - d))² has u = 2 / (1 + (d / m)²)
+    assert share_of_the_last(0.5, 1.5) < by_load < share_of_the_last(0.5, 2.0)
+    (own,) = (p for p in term.parameters if p.name == "unevenness")
+    assert own.high > 2.5
+
+
 def test_a_slack_set_keeps_some_friction():
     term = term_of(set_response())
     for size in (0.1, 3.0 * term.increase):

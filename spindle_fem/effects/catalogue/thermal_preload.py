@@ -38,8 +38,9 @@ EXPONENT_SIGMA, STATE_SIGMA = 0.12, 0.3
 # Standard deviation of the logarithm of the housing's growth over what elasticity says of its temperatures:
 # expansion of cast iron is known to a twentieth, and a channel's lands and a frame hold it otherwise.
 HOUSING_SIGMA = 0.15
-# Standard deviation of the unevenness within a set: spacers ground to fit share the load otherwise.
-UNEVENNESS_SIGMA = 0.5
+# Standard deviation and largest value of the unevenness within a set: spacers ground to fit share the load
+# otherwise. Half the exponent of the mechanics evens out what up to 2 restores; twice the deviation is left.
+UNEVENNESS_SIGMA, MOST_UNEVENNESS = 0.5, 3.0
 # In standard deviations of the clearance, from what is ordered: its ends and root mean square. A fit looser
 # than ordered is likelier than a tighter one, as rings are made smaller than their size and bores larger.
 CLEARANCES, CLEARANCE_WIDTH = (-2.0, 4.0), 1.6
@@ -114,7 +115,7 @@ class PreloadMechanicsTerm(Term):
         self.parameters = (
             amplitude(NAME, LOAD_SHARE_SIGMA * self.increase, high=MOST_LOAD_SHARE * self.increase),
             linear("outer_clearance", nominal, CLEARANCE_WIDTH * sigma, "m", low=low, high=high),
-            linear("unevenness", 1.0, UNEVENNESS_SIGMA, low=0.0, high=1.0 + 2.0 * UNEVENNESS_SIGMA),
+            linear("unevenness", 1.0, UNEVENNESS_SIGMA, low=0.0, high=MOST_UNEVENNESS),
             shape("exponent_factor", 1.0, STATE_SIGMA, low=0.5, high=2.0),
             shape("housing_share", 1.0, HOUSING_SIGMA, low=0.2, high=3.0),
             linear("speed_exponent", 0.0, SPEED_SIGMA, low=-1.0, high=1.0),

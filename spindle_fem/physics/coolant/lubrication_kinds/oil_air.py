@@ -52,7 +52,7 @@ def nusselt_whitaker(reynolds: Array, prandtl: Array, at_rest: Array) -> Array:
     wall taken as that of the stream.
 
     >>> float(nusselt_whitaker(1.0e4, 0.71, 2.0).round(1))
-    61.1
+    61.2
     """
     return at_rest + (0.4 * np.sqrt(reynolds) + 0.06 * np.cbrt(reynolds) ** 2) * prandtl**0.4
 
