@@ -220,16 +220,21 @@ class HeatResponse:
         return follow_branch(respond, state, start, end, weak=2 * len(self.names))
 
     def renewed(self, branch: Branch, end: float) -> Branch:
-        """A branch to its fold with films, oil and joints that go from those given to those of the fold."""
+        """A branch to its fold with films, oil and joints that go from those given to those of the fold.
+
+        The same branch, with the reason, where there are none at the fold.
+        """
         count = len(self.names)
         begin = branch.states[0]
         heats = begin[:count].sum(), branch.top[:count].sum()
-        if branch.end != "fold" or not heats[1] > heats[0]:
+        if branch.end != "fold":
             return branch
+        if not heats[1] > heats[0]:
+            return replace(branch, reason="the heat of the bearings does not rise towards it")
         try:
             there = self.at(branch.top, branch.limit)
-        except SpindleFemError:
-            return branch
+        except SpindleFemError as error:
+            return replace(branch, reason=str(error))
 
         def between(heat: Array, conductance: Array) -> Array:
             share = (heat.sum() - heats[0]) / (heats[1] - heats[0])

@@ -52,7 +52,7 @@ class Branch:
     top : (k,) ndarray
         State there.
     reason : str
-        Why there was no response.
+        Why there was no response; of a fold, why it is not that of its own state.
     """
 
     parameter: Array

@@ -32,8 +32,8 @@ def equilibrium_of(
     Parameters
     ----------
     search : bool
-        Whether to look for the fold, with films and contacts of this state: up to half as fast again, or to
-        the end of the machine's range of speeds where that is further.
+        Whether to look for the fold: up to half as fast again, or to the end of the machine's range of
+        speeds where that is further.
     """
     spec = machine.spec
     assembled = assembled_preloads(spec)
@@ -47,6 +47,11 @@ def equilibrium_of(
         searched = branch.limit
         if branch.end == "fold":
             fold = branch.limit
+            if branch.reason:
+                limits.append(
+                    f"The end at {fold * 30.0 / math.pi:.0f} rpm is that of films, oil and joints of this "
+                    f"state: {branch.reason}"
+                )
         elif branch.end == "refused":
             limits.append(
                 f"From {branch.limit * 30.0 / math.pi:.0f} rpm on there is no state: {branch.reason}"
