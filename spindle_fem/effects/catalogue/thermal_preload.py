@@ -40,7 +40,8 @@ EXPONENT_SIGMA, STATE_SIGMA = 0.12, 0.3
 HOUSING_SIGMA = 0.15
 # Standard deviation and largest value of the unevenness within a set: spacers ground to fit share the load
 # otherwise. Half the exponent of the mechanics evens out what up to 2 restores; twice the deviation is left.
-UNEVENNESS_SIGMA, MOST_UNEVENNESS = 0.5, 3.0
+UNEVENNESS_SIGMA = 0.5
+MOST_UNEVENNESS = 2.0 + 2.0 * UNEVENNESS_SIGMA
 # In standard deviations of the clearance, from what is ordered: its ends and root mean square. A fit looser
 # than ordered is likelier than a tighter one, as rings are made smaller than their size and bores larger.
 CLEARANCES, CLEARANCE_WIDTH = (-2.0, 4.0), 1.6
