@@ -75,11 +75,11 @@ class LoadsBuilder:
         self.mesh = mesh
         self.heat_model = heat_model
         self.n_sectors = 1 if spec.mesh.circumferential_averaging else SECTORS_WITHOUT_AVERAGING
-        rows = {
+        self._rows = {
             row: np.full(self.n_sectors, film.element_surface / self.n_sectors)
             for row, film in spec.wetted_rows.items()
         }
-        self.facet_area = {**facet_area, **rows}
+        self.facet_area = {**facet_area, **self._rows}
         self._centres = {name: facet_centres(mesh.points, facets) for name, facets in mesh.surfaces.items()}
         self.cells: ChannelCells | None = None
         self.coolant_loop: CoolantLoop | None = None
@@ -96,7 +96,7 @@ class LoadsBuilder:
     # ------------------------------------------------------------------ means
     def surface_mean(self, surface: str, state: FieldState) -> float:
         """Area mean of the temperature over a surface, or of a row of balls, K."""
-        if surface in self.spec.wetted_rows:
+        if surface in self._rows:
             return self.ball_temperature(surface.removesuffix(".balls"), state)
         areas = self.facet_area[surface]
         return float(areas @ state.facets[surface] / areas.sum())

@@ -154,7 +154,7 @@ def _build_result(machine: PreparedMachine, point: OperatingPoint, coupled: Coup
     warnings += [
         *lost_to_air(spec),
         *operation_warnings(spec, point.speed),
-        *heated_gaps_without_exchange(spec, build_assembly(spec)),
+        *(heated_gaps_without_exchange(spec, build_assembly(spec)) if spec.source else ()),
         *speeds_beyond_catalogues(spec, point.speed),
         *_omitted_preload(spec, point, coupled, around),
         *fold_warnings(contact_warnings(coupled), bearings),

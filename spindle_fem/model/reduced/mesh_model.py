@@ -147,9 +147,8 @@ def _conduction(
         found[f"joint.{contact}"] = _padded(operators.joint_matrix(contact), size)
     for film in spec.film:
         for surface in film.surface:
-            if surface == getattr(film, "ball_row", None):
-                continue
-            found[f"film.{surface}"] = _padded(operators.film_matrix(surface), size)
+            if surface not in spec.wetted_rows:
+                found[f"film.{surface}"] = _padded(operators.film_matrix(surface), size)
     names = [name for name, _ in lumped]
     for row in spec.wetted_rows:
         nodes = machine.builder.ball_nodes(row.removesuffix(".balls"))
