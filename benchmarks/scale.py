@@ -3,10 +3,11 @@
     python benchmarks/scale.py [MACHINE] [--workers 1 2 4 8] [--designs 32] [--preset coarse] [-o FILE.json]
 
 Every design differs in flow and oil temperature, so all share one mesh. For
-each number of workers: rows an hour of the study, the largest worker, and the overhead a row:
-the same tasks through the same scheduler with an answer that is ready. Then
-what reading, checking, sending and writing one design costs. More workers than cores
-show contention, not scaling. ``benchmarks/scheduler.py`` goes on from the file that is written.
+each number of workers: rows an hour of the study, the largest worker before its first row
+and at its peak, and the overhead a row: the same tasks through the same scheduler with an
+answer that is ready. Then what reading, checking, sending and writing one design costs. More
+workers than cores show contention, not scaling. ``benchmarks/scheduler.py`` goes on from the
+file that is written.
 """
 
 from __future__ import annotations
@@ -15,19 +16,22 @@ import argparse
 import json
 import os
 import pickle
-import resource
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from spindle_fem.parallel import WorkerPool
 from spindle_fem.studies.sweep import run_tasks as runner
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, Question, evaluate_tasks
 from spindle_fem.studies.sweep.prepared_study import PreparedStudy, prepare_study
 from spindle_fem.studies.sweep.results_table import ResultTable, Row
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 STUDY = """
 schema = "spindle-fem/study/1"
@@ -55,9 +59,19 @@ def ready_answer(tasks: Sequence[DesignTask], question: Question) -> list[Row]:
     ]
 
 
-def peak_memory() -> float:
-    """Largest resident memory of this process so far, MB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+def memory() -> dict[str, float]:
+    """Resident memory of this process, now and at its largest, MB.
+
+    ``ru_maxrss`` would keep what the process that started it held.
+    """
+    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    named = dict(line.split(":", 1) for line in lines)
+    return {name: int(named[name].split()[0]) / 1024.0 for name in ("VmRSS", "VmHWM")}
+
+
+def _largest(client: Client, kind: str) -> float:
+    """Of all workers, MB."""
+    return max(worker[kind] for worker in client.run(memory).values())
 
 
 def _rows(pool: WorkerPool, jobs: list[partial]) -> list[dict]:
@@ -77,6 +91,9 @@ def on_cluster(prepared: PreparedStudy, workers: int) -> dict[str, float]:
         first = [list(pieces[0][:1])] * (2 * workers)
         pool = WorkerPool(scheduler=address)
         question = prepared.question
+        list(pool.stream([partial(ready_answer, piece, question) for piece in first]))
+        with Client(address) as client:
+            program = _largest(client, "VmRSS")
         list(pool.stream([partial(evaluate_tasks, piece, question) for piece in first]))
         begin = time.perf_counter()
         rows = _rows(pool, [partial(evaluate_tasks, piece, question) for piece in pieces])
@@ -86,14 +103,15 @@ def on_cluster(prepared: PreparedStudy, workers: int) -> dict[str, float]:
         empty = _rows(pool, repeated)
         overhead = time.perf_counter() - begin
         with Client(address) as client:
-            peaks = client.run(peak_memory)
+            peak = _largest(client, "VmHWM")
     return {
         "workers": workers,
         "rows": len(rows),
         "solved": sum(row["status"] == "ok" for row in rows),
         "seconds": seconds,
         "rows_an_hour": 3600.0 * len(rows) / seconds,
-        "worker_peak_MB": max(peaks.values()),
+        "worker_program_MB": program,
+        "worker_peak_MB": peak,
         "overhead_ms_a_row": 1e3 * overhead / len(empty),
         "rows_a_piece": len(prepared.tasks) / len(pieces),
     }
