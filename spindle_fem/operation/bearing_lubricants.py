@@ -60,6 +60,7 @@ class SetLubricant:
             palmgren_f0=self.kind.ball_factor if own is None else own,
             palmgren_f0_rollers=self.kind.roller_factor if own is None else own,
             skf_replenishment=self.kind.replenishment,
+            flooded=self.kind.churns,
         )
 
     def warnings(self, options: HeatOptions) -> tuple[CodedWarning, ...]:

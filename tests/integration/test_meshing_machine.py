@@ -245,6 +245,33 @@ def test_best_attempt_below_the_aim_is_kept_and_said_so(machine, monkeypatch):
     assert made.notes[-1] == f"worst element has minSICN {made.min_quality:.3f}, below the 0.9 aimed at"
 
 
+@pytest.mark.parametrize(
+    ("limits", "tried"),
+    [
+        # fit elements end the search before settings that mesh finer
+        ({}, ["Delaunay", "frontal", "thin", "end"]),
+        # without them, finer settings are tried while they do not make too many elements
+        ({"FIT_QUALITY": 0.95}, ["Delaunay", "frontal", "thin", "finer", "end"]),
+        ({"FIT_QUALITY": 0.95, "MOST_ELEMENTS": 1000}, ["Delaunay", "frontal", "thin", "end"]),
+    ],
+)
+def test_finer_settings_end(machine, monkeypatch, limits, tried):
+    from spindle_fem.machine.meshing import build_mesh as build
+
+    ladder = {
+        "Delaunay": Attempt(5, 10, 1.0), "frontal": Attempt(6, 10, 1.0),
+        "thin": Attempt(6, 10, 1.0, clearance_share=0.15), "finer": Attempt(6, 10, 0.85, 0.35),
+    }  # fmt: skip
+    names, genuine = {attempt: name for name, attempt in ladder.items()}, build.mesh_once
+    mesh, asked = genuine(machine, build_sizes(machine, "coarse"), ladder["frontal"], 1), []
+    monkeypatch.setattr(build, "mesh_once", lambda *given: asked.append(names[given[2]]) or mesh)
+    for name, value in ({"MINIMUM_QUALITY": 0.9} | limits).items():
+        monkeypatch.setattr(build, name, value)
+    made = generate_mesh(machine, build_sizes(machine, "coarse"), ladder=tuple(ladder.values()))
+    assert [*asked, "end"] == tried
+    assert made.notes[-1].startswith("worst element has minSICN")
+
+
 def test_no_attempt_left(machine, monkeypatch):
     def fail(*_):
         raise MeshQualityError("mesh", "gmsh failed", "Change it.")

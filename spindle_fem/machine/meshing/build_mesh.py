@@ -20,6 +20,11 @@ LOGGER = logging.getLogger(__name__)
 # Below the aim, a mesh whose worst element is better than this is kept, with a
 # note, when no settings do better; anything worse is an error.
 TOLERATED_QUALITY = 0.05
+# Elements that are fit for use: finer settings, which take many times as long, are not
+# tried for the aim's sake.
+FIT_QUALITY = 0.10
+# Finer settings that would make more elements than this are not tried either.
+MOST_ELEMENTS = 1_500_000
 
 
 def build_mesh(
@@ -75,7 +80,9 @@ def generate_mesh(
     """Mesh with the first settings of ``ladder`` that pass every check.
 
     The aim is minSICN above 0.15. What had to be tried beyond the first, or a
-    worst element below the aim, is in the mesh's ``notes`` and logged.
+    worst element below the aim, is in the mesh's ``notes`` and logged. Finer settings than asked for are
+    tried only while no mesh has a worst element above ``FIT_QUALITY``, and while none would have more than
+    ``MOST_ELEMENTS``.
 
     Raises
     ------
@@ -84,9 +91,20 @@ def generate_mesh(
     """
     failures: list[str] = []
     best: TaggedMesh | None = None
+    made = 0
     for attempt in ladder:
+        if attempt.size_factor < 1.0:
+            if best is not None and best.min_quality > FIT_QUALITY:
+                break
+            expected = made / attempt.size_factor**3
+            if expected > MOST_ELEMENTS:
+                failures.append(f"{attempt.describe()}: would make some {expected:.2g} elements")
+                continue
         try:
-            mesh = tag_mesh(assembly, mesh_once(assembly, sizes, attempt, threads), digest)
+            linear = mesh_once(assembly, sizes, attempt, threads)
+            if attempt.size_factor == 1.0:
+                made = len(linear.tetrahedra)
+            mesh = tag_mesh(assembly, linear, digest)
             require_quality(mesh, minimum=TOLERATED_QUALITY)
         except MeshQualityError as error:
             failures.append(f"{attempt.describe()}: {error.what}")

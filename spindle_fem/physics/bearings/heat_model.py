@@ -34,7 +34,7 @@ class HeatOptions:
     beside : tuple of str
         Further ones, whose heat in the same equilibrium ``BearingState.heat_beside`` gets.
     rolling_surfaces : {2, 1}
-        Houpert's rolling force acts on both surfaces of a contact: power
+        The hydrodynamic rolling force acts on both surfaces of a contact: power
         2 F_R u. Some papers count one.
     hysteresis_loss : float, [-]
         Share of the elastic work lost in a load cycle of hard steel.
@@ -42,6 +42,9 @@ class HeatOptions:
         f_0 of a row of rollers; that of the bearing or its kind where None.
     skf_replenishment : float, [-]
         K_rs: 6e-8 for grease and oil-air, 3e-8 for oil baths and jets.
+    flooded : bool
+        Whether oil stands all around the contacts (baths, jets); else rolling of ``full`` is that of inlets
+        that are starved a little.
     """
 
     level: str = "full"
@@ -50,6 +53,7 @@ class HeatOptions:
     palmgren_f0: float = 2.0
     palmgren_f0_rollers: float | None = None
     skf_replenishment: float = 6.0e-8
+    flooded: bool = False
     skf_friction_ehl: float = 0.04
     skf_friction_boundary: float = 0.15
     beside: tuple[str, ...] = ()

@@ -85,8 +85,8 @@ class LubricationKind:
     film : callable
         :class:`BearingStream` to the films of both raceways and of the rolling elements.
     churns : bool
-        Whether more oil is about than the contacts need, whose drag the catalogue formula ``skf`` adds from a
-        diagram.
+        Whether more oil is about than the contacts need: their inlets are flooded, and it drags, which the
+        catalogue formula ``skf`` adds from a diagram.
     """
 
     ball_factor: float
