@@ -31,9 +31,13 @@ from tests.published.test_catalogue_friction import (
     rollers,
 )
 from tests.published.test_measured_friction import (
+    FRONT,
     GREASE,
     JETS,
     RUN_DOWNS,
+    bath_heat,
+    inlet,
+    inlet_forces,
     jet_heat,
     ring_to_ring,
     rolling_forces,
@@ -41,10 +45,6 @@ from tests.published.test_measured_friction import (
 )
 
 Row = tuple[str, str, float, float]
-FRONT = BearingGeometry(
-    14.2875e-3, 30, 165e-3, math.radians(15.0), 0.52, 0.52, bore_diameter=0.14, outer_diameter=0.19,
-    static_load_rating=100e3,
-)  # fmt: skip
 HARRIS = BearingGeometry(22.225e-3, 16, 125.26e-3, math.radians(40.0), 0.5232, 0.5232, 206.8e9, 0.29)
 LE7 = BearingGeometry(7.938e-3, 10, 38.5e-3, math.radians(20.0), 0.56, 0.52, 199.948e9, 0.25, 7750.37)
 
@@ -109,7 +109,11 @@ def reference_speed_rows() -> list[Row]:
             groove(row), turn(row[5]), 12e-6, 0.0, 50.0 * row[4], friction_ehl=0.05, replenishment=OIL_BATH
         )
         ours = moment.total * turn(row[5])
-        found.append((f"{name}, {row[5]} rpm", "SKF without drag, W", reference_heat(row), ours))
+        full = bath_heat(row, flooded=True)
+        found += [
+            (f"{name}, {row[5]} rpm", "SKF without drag, W", reference_heat(row), ours),
+            (f"{name}, {row[5]} rpm", "full without drag, W", reference_heat(row), full),
+        ]
     for name, row in ROLLERS.items():
         case = (rollers(row), turn(row[5]), 12e-6, 50.0 * row[4])
         moments = {
@@ -162,6 +166,13 @@ def measured_rows() -> list[Row]:
             measured = 1e3 * run_down_force(size, load, rpm)
             ours = 1e3 * rolling_forces(size, load, rpm)["houpert"]
             found.append((case, "Houpert rolling, mN", measured, ours))
+    for load in (568.6, 1137.2, 2954.0):
+        case, (starved, flooded) = f"71928, outer, {load:g} N, 3000 rpm", inlet_forces(load)
+        integrated = 1e3 * inlet(load)[1]
+        found += [
+            (case, "flooded rolling, mN (inlet integrated)", integrated, 1e3 * flooded),
+            (case, "Houpert rolling, mN (inlet integrated)", integrated, 1e3 * starved),
+        ]
     return found
 
 
@@ -173,6 +184,7 @@ def conductance_rows() -> list[Row]:
         found += [
             (case, "ring to ring, balls wetted over 30 %, W/K", to["fag"], to["ours"]),
             (case, "ring to ring, wetted all round, W/K", to["fag"], to["wetted"]),
+            (case, "ring to ring by Jungnickel, 30 %, W/K", to["jungnickel with oil"], to["ours"]),
         ]
     return found
 

@@ -1,6 +1,7 @@
 """Oil lubrication: balances by hand, factors of friction, what a definition may say."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from spindle_fem.operation.circuits import (
     wall_coefficients,
 )
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.bearings.bearing_set import solve_bearing
+from spindle_fem.physics.bearings.heat_model import HeatOptions
 from spindle_fem.physics.bearings.heat_models.palmgren import palmgren_moment
 from spindle_fem.physics.coolant.lubrication_kind import film_harris, flooded_fill, path_fill_parker
 from spindle_fem.results.thermal_result import BearingResult
@@ -118,6 +121,23 @@ def test_the_path_that_oil_fills_follows_flow_and_speed(spec):
     assert lubricant.at(24_000 * RPM).path_fill == flooded_fill(stream)
     assert lubricant.at(24_000 * RPM).path_fill < lubricant.at(20_000 * RPM).path_fill
     assert lubricant.at(0.0).path_fill == 0.0
+
+
+def test_inlets_are_flooded_where_oil_stands(spec):
+    mechanics, point = BearingMechanics(spec), OperatingPoint.of(spec)
+    lubricants = {group.name: SetLubricant(spec, group) for group in spec.bearing_set}
+    full = HeatOptions("full")
+    assert lubricants["rear"].options(full).flooded
+    assert not lubricants["front"].options(full).flooded
+    warm = {bearing.name: BearingTemperatures(*(313.15,) * 5) for _, bearing in spec.bearings}
+    state = mechanics.states(point, warm, expand=False)["R1"]
+    kept = replace(lubricants["rear"].options(full), flooded=False)
+    case, oil = (state.geometry, point.speed, state.axial_force), lubricants["rear"].at(point.speed)
+    rolling = [
+        solve_bearing(*case, lubricant=oil, heat=heat).heat.terms["outer_rolling"]
+        for heat in (kept, replace(kept, flooded=True))
+    ]
+    assert 1.3 < rolling[1] / rolling[0] < 2.5
 
 
 def test_beyond_its_range_a_law_says_so(spec):

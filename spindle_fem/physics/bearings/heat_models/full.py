@@ -21,7 +21,7 @@ from spindle_fem.physics.bearings.lubricant_film import film_groups, inlet_shear
 @HEAT_MODELS.register
 @friction_model(ball_attitude="equilibrium", needs_boundary=True, counts_cage=True)
 def full(inputs: HeatInputs, options: HeatOptions) -> BearingHeat:
-    """Heat terms of the paper plus hydrodynamic rolling resistance (Houpert), hysteresis, cage and seal."""
+    """Heat terms of the paper plus hydrodynamic rolling resistance, hysteresis, cage and seal."""
     sliding = paper(inputs, options)
     rolling, hysteresis = _rolling_powers(inputs, options)
     rolling_contacts = {"rolling": rolling, "hysteresis": hysteresis}
@@ -79,8 +79,9 @@ def rolling_resistance_flooded(
     >>> round(float(force), 3)
     0.22
     """
-    length = 2.0 * semi_major
-    line = (material_group * speed_group) ** 0.658 * (load_group * radius / length) ** 0.0126
+    length = 2.0 * np.asarray(semi_major)
+    along = np.divide(load_group * radius, length, out=np.zeros_like(length), where=length > 0.0)
+    line = (material_group * speed_group) ** 0.658 * along**0.0126
     return 4.318 * length * radius * reduced_modulus / material_group * line
 
 
