@@ -100,7 +100,7 @@ def solve_coupled(
     """
     try:
         return _settle(machine, point, start, beyond)
-    except NoSteadyStateError as error:
+    except (NoSteadyStateError, ConvergenceError) as error:
         if not machine.spec.follows_preload:
             raise
         raise _beyond_the_fold(machine, point, error, beyond) from error
@@ -292,12 +292,17 @@ def _linear_tolerance(change: float) -> float:
 
 
 def _beyond_the_fold(
-    machine: PreparedMachine, point: OperatingPoint, error: NoSteadyStateError, beyond: Beyond | None
-) -> NoSteadyStateError:
+    machine: PreparedMachine,
+    point: OperatingPoint,
+    error: NoSteadyStateError | ConvergenceError,
+    beyond: Beyond | None,
+) -> NoSteadyStateError | ConvergenceError:
     """The error of a runaway, with the speed up to which the machine has an equilibrium.
 
-    Equilibria are followed with films and contacts at ambient temperature first, then with those of
-    states solved just below the speed that was reached, until that stays.
+    Just beyond a fold temperatures creep on without end: what did not converge there is a runaway too.
+    The error itself where equilibria go on. They are followed with films and contacts at ambient
+    temperature first, then with those of states solved just below the speed that was reached, until that
+    stays.
     """
     try:
         slow = replace(point, speed=SLOW_RUNNING * point.speed)
@@ -313,4 +318,6 @@ def _beyond_the_fold(
         return error
     if branch.end == "end":
         return error
+    if isinstance(error, ConvergenceError):
+        error = no_equilibrium(machine.spec.name, point, error.what)
     return beyond_the_branch(error, branch)

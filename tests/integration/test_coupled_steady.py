@@ -3,19 +3,22 @@
 import dataclasses
 import math
 import re
+import types
 
 import numpy as np
 import pytest
 
 from spindle_fem.definition.exchange_tables import SeatSurface
 from spindle_fem.definition.load import load_machine
-from spindle_fem.errors import CheckFailedError, FaultsError, NoSteadyStateError
+from spindle_fem.errors import CheckFailedError, ConvergenceError, FaultsError, NoSteadyStateError
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.model.mesh.steady_conduction import solve_steady
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.solvers import coupled_steady
 from spindle_fem.solvers.coupled_steady import LINEAR_RESIDUAL_LIMIT, solve_coupled
 from spindle_fem.solvers.preload_runaway import equilibria_above
 from spindle_fem.solvers.prepared_machine import machine_on_mesh, prepare_machine, without_expansion
+from spindle_fem.solvers.solution_branch import Branch
 from spindle_fem.studies.run_checks import require_checks
 from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared
 from tests.support.near_rings import NEAR_RINGS
@@ -234,6 +237,28 @@ def test_seats_that_follow_their_fits_conduct_better_where_the_rings_press(follo
     assert factors["joint.F3.outer_ring|housing"] > 1.5
     assert not any(name.endswith(":face") for name in factors)
     assert state.loads.bearing_heat["F3"].preload < followed_result.bearings["F3"].preload
+
+
+@pytest.mark.parametrize(("end", "kind"), [("fold", NoSteadyStateError), ("end", ConvergenceError)])
+def test_what_creeps_on_beyond_a_fold_is_a_runaway_and_below_it_is_not(monkeypatch, end, kind):
+    """Stand-ins for the branch: it turns at 99 % of the speed asked for, or reaches it."""
+    asked = OperatingPoint.of(load_machine("uncooled"))
+    limit = asked.speed * (0.99 if end == "fold" else 1.0)
+    branch = Branch(np.array([limit]), np.ones((1, 1)), end, limit, np.ones(1))
+
+    def settle(machine, point, start, beyond):
+        if point.speed > limit or end == "end":
+            raise ConvergenceError(machine.spec.name, "temperatures still change by 0.6.")
+        return types.SimpleNamespace(loads=None, solution=None)
+
+    monkeypatch.setattr(coupled_steady, "_settle", settle)
+    monkeypatch.setattr(coupled_steady, "equilibria_above", lambda *_: branch)
+    response = types.SimpleNamespace(branch=lambda end: branch)
+    monkeypatch.setattr(coupled_steady, "HeatResponse", lambda *_: response)
+    machine = types.SimpleNamespace(spec=types.SimpleNamespace(name="crept", follows_preload=True))
+    told = rf"fold at {limit / RPM:.0f} rpm" if end == "fold" else "still change by"
+    with pytest.raises(kind, match=told):
+        solve_coupled(machine, asked)
 
 
 @pytest.mark.slow
