@@ -119,7 +119,7 @@ _HARMS = (
     "film_not_separating",
     "boundary_lubrication",
 )
-_UNSURE = ("film_uncertain",)
+_UNSURE = ("film_uncertain", "wetting_assumed")
 _NOTES = ("mesh_note", "geometry_note")
 
 

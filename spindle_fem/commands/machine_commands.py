@@ -70,6 +70,7 @@ def run_machine(
         from spindle_fem.solvers.prepared_machine import prepare_machine
         from spindle_fem.studies.run_checks import require_checks
         from spindle_fem.studies.solve_machine import estimate_refinement, solve_prepared
+        from spindle_fem.studies.wetting_range import with_wetting_range
 
         helpers.start_charts()
         prepared = prepare_machine(spec, progress=tell)
@@ -77,6 +78,7 @@ def run_machine(
         result = solve_prepared(
             prepared, progress=tell, find_fold=True, solved=lambda first: helpers.begin(first, place)
         )
+        result = with_wetting_range(result)
         if estimate_mesh_error:
             tell("second mesh")
             result = estimate_refinement(result, spec)
