@@ -138,8 +138,12 @@ def _serve(make: Callable[[], Any], connection: Any, other_end: Any) -> None:
     # what the original holds is no garbage of this process, and looking at it would copy it
     gc.freeze()
     os.environ.update(ONE_THREAD)
-    # xarray would load Dask, for half a second, to ask whether arrays are Dask's: here none is
-    sys.modules.setdefault("dask", None)
+    # xarray would load Dask, for half a second, to ask whether arrays are Dask's: here none is. Where the
+    # original found out that there is a Dask without loading it, xarray does ask.
+    if "dask" not in sys.modules:
+        answers = types.ModuleType("dask.base")
+        answers.is_dask_collection = lambda value: False
+        sys.modules |= {"dask": None, "dask.base": answers}
     worker_threads._thread_count.cache_clear()
     asked: queue.SimpleQueue = queue.SimpleQueue()
 

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from spindle_fem import load_machine, solve
+from spindle_fem.commands.console import print_run
 
 FILES = ("summary.json", "fields.vtu", "result.nc", "report.html", "machine.toml")
 
@@ -105,12 +106,17 @@ def test_run_into_a_folder_of_other_things_is_refused(command, tmp_path):
 
 
 @pytest.mark.render
-def test_a_failed_check_comes_with_the_tables_and_where_they_are(command, tmp_path):
+def test_a_failed_check_comes_with_one_document_and_where_the_results_are(command, tmp_path, capsys):
     done = command(
         "run", "small_two_start", "--set", "mesh.preset=coarse", "--set", "mesh.order=1",
-        "--set", "grease.temperature_limit=21 degC", "-o", tmp_path / "out",
+        "--set", "grease.temperature_limit=21 degC", "-o", tmp_path / "out", "--json",
     )  # fmt: skip
     assert done.returncode == 1
-    assert "inner °C" in done.stdout
+    summary = json.loads(done.stdout)
+    assert [check["name"] for check in summary["checks"] if not check["passed"]] == ["grease temperature"]
+    assert summary == json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    # without --json the same is shown as tables
+    print_run(summary, folder=tmp_path / "out")
+    assert "inner °C" in capsys.readouterr().out
     assert "grease temperature" in done.stderr
     assert str(tmp_path / "out" / "report.html") in done.stderr.replace("\n", "")

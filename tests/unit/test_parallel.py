@@ -204,6 +204,26 @@ def test_an_error_in_a_background_process_is_raised_here_and_it_goes_on():
 
 
 @pytest.mark.skipif(not SEVERAL_CORES, reason="works in this process on one core")
+class AsksForDask:
+    """Does what xarray does with every array of a dataset."""
+
+    def about(self, value):
+        from xarray.namedarray.utils import is_dask_collection
+
+        return is_dask_collection(value)
+
+
+@pytest.mark.skipif(not SEVERAL_CORES, reason="works here, where Dask may be loaded")
+def test_a_background_process_needs_no_dask_that_was_only_heard_of(monkeypatch):
+    from xarray.namedarray.utils import module_available
+
+    assert module_available("dask")  # xarray remembers it
+    for name in [name for name in sys.modules if name.partition(".")[0] == "dask"]:
+        monkeypatch.delitem(sys.modules, name)
+    with BackgroundProcess(AsksForDask) as process:
+        assert process.ask("about", 1.0)() is False
+
+
 def test_a_background_process_that_dies_is_an_error_that_names_the_call():
     with BackgroundProcess(Counter) as process:
         before, at, after = process.ask("add", 1), process.ask("die"), process.ask("add", 2)
