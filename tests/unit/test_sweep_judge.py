@@ -169,6 +169,21 @@ def test_growth_and_preload_are_outputs_of_full_solves():
     assert "growth.nose_axial_um" not in output_paths(load_machine("small_two_start"))
 
 
+def test_axial_loads_of_balls_are_outputs_of_full_solves():
+    # springs of the rear press on a front set in tandem, which has no preload of its own
+    paths = output_paths(load_machine("router_spindle"))
+    loads = {path for path in paths if path.endswith(".axial_load_N")}
+    assert loads == {f"bearings.{name}.axial_load_N" for name in ("F1", "F2", "R1", "R2")}
+    assert all(map(only_full, loads))
+    assert limit_of("1.2 kN", "bearings.F1.axial_load_N", "constraint[1].max") == pytest.approx(1200.0)
+    # rollers take none, and a table of heat knows none
+    rolling = output_paths(load_machine("belt_lathe"))
+    assert "bearings.L1.axial_load_N" in rolling
+    assert "bearings.F1.axial_load_N" not in rolling
+    table = output_paths(load_machine("wu_tan_2016", ["heat.model=table"]))
+    assert not any(path.endswith(".axial_load_N") for path in table)
+
+
 def test_what_a_stream_does_is_an_output_of_machines_with_streams():
     spec = load_machine("grinding_spindle")
     paths = set(output_paths(spec))

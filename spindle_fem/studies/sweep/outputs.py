@@ -84,8 +84,9 @@ _OF_BEARINGS = (
 COOLER_HEAT = "derived.cooler_heat_W"
 # How the nose bends aside, where a machine has two sets of bearings.
 _NOSE_ASIDE = ("radial_up_um", "radial_across_um", "tilt_up_urad", "tilt_across_urad")
-# Of each bearing's set; only full solves have it.
+# Of each bearing and its set; only full solves have them.
 STIFFNESS = ".axial_stiffness_N_um"
+AXIAL_LOAD = ".axial_load_N"
 # Summary blocks, and one number, that only a solve of the whole field has.
 _ONLY_FULL = ("circuits.", "growth.", "displacements.", "equilibrium.", "energy.imbalance_relative")
 # Outputs that are words, which no limit or objective can use.
@@ -107,7 +108,7 @@ def only_full(path: str) -> bool:
     >>> only_full("growth.nose_axial_um"), only_full("probes.SP01")
     (True, False)
     """
-    return path.startswith(_ONLY_FULL) or path.endswith(STIFFNESS)
+    return path.startswith(_ONLY_FULL) or path.endswith((STIFFNESS, AXIAL_LOAD))
 
 
 def of_shape(path: str) -> bool:
@@ -143,8 +144,11 @@ def _paths(spec: MachineSpec) -> Iterator[str]:
         spacers = (part.name for part in spec.part if Layout(spec, set()).is_spacer(part))
         yield from (f"growth.spacers.{name}.length_um" for name in spacers)
     yield from (f"displacements.{sensor.name}" for sensor in spec.displacement_sensor)
-    for group in spec.bearing_set:
-        if group.preload > 0.0 and spec.heat.model != "table":
+    for group in spec.bearing_set if spec.heat.model != "table" else ():
+        for bearing in group.bearing:
+            if bearing.takes_thrust is not None:
+                yield f"bearings.{bearing.name}{AXIAL_LOAD}"
+        if group.preload > 0.0:
             yield from (f"equilibrium.preload_ratio.{bearing.name}" for bearing in group.bearing)
             yield from (f"bearings.{bearing.name}{STIFFNESS}" for bearing in group.bearing)
 
