@@ -75,7 +75,7 @@ def le11(count: int) -> ElasticBody:
 def stress_at_a(body: ElasticBody) -> float:
     """σ_zz where the sphere's inside meets the plane of symmetry, Pa; T = r + z."""
     mesh, law = body.section.mesh, body.stiffnesses[0]
-    shift = between_planes(body, body.expansion_load() @ mesh.p.sum(axis=0))
+    shift = between_planes(body, body.expansion_load @ mesh.p.sum(axis=0))
     corner = int(np.argmin(np.hypot(mesh.p[0], mesh.p[1] - 1.0)))
     (element,) = np.flatnonzero((mesh.t == corner).any(axis=0))
     place = mesh.elem.refdom.p[:, mesh.t[:, element] == corner]
@@ -107,7 +107,7 @@ def test_bimetal_of_timoshenko(thickness_ratio: float, modulus_ratio: float) -> 
         section,
         [ElasticMaterial(e, 0.3, a).stiffness for e, a in zip(moduli, expansion, strict=True)],
     )
-    shift = body.solve(body.expansion_load() @ np.full(section.mesh.nvertices, hot))
+    shift = body.solve(body.expansion_load @ np.full(section.mesh.nvertices, hot))
     radii = np.array([0.035, 0.065])
     z, r = section.mesh.p
     nodes = [int(np.argmin(np.hypot(z, r - radius))) for radius in radii]
@@ -131,7 +131,7 @@ def test_a_clamped_bar_takes_its_expansion_as_stress() -> None:
 
 def test_free_expansion_leaves_no_stress() -> None:
     body, hot = ring(0.01, 0.1), 50.0
-    shift = body.solve(body.expansion_load() @ np.full(body.section.mesh.nvertices, hot))
+    shift = body.solve(body.expansion_load @ np.full(body.section.mesh.nvertices, hot))
     law, r = STEEL.stiffness, body.basis.default_parameters()["x"][1]
     strain = np.array(strains(body.basis.interpolate(shift), r, 0)[:3])
     stress = np.einsum("ij,jep->iep", law.normal, strain) - law.thermal[:, None, None] * hot
@@ -157,7 +157,7 @@ def test_turning_wall_converges_at_the_rate_of_theory() -> None:
     errors = []
     for size in (0.01, 0.005):
         body = ring(size, 0.02)
-        found = body.basis.interpolate(between_planes(body, body.spin_load() * 1000.0**2))
+        found = body.basis.interpolate(between_planes(body, body.spin_load * 1000.0**2))
         r = body.basis.default_parameters()["x"][1]
         shift, slope, around = turning_wall(r, 1000.0)
         weight = body.basis.dx * r

@@ -145,7 +145,7 @@ def test_a_holder_on_a_bent_housing_takes_its_own_shift_off(grown) -> None:
 def _of_housing(model, z, r):
     """Shift (along, outwards) of a spot on top of the housing from the plane behind the flange, at 10 K/m."""
     body, (back, mount, turn) = model._bent_housing, model._frame
-    moved = body.solve(body.expansion_load() @ (10.0 * body.section.mesh.p[1]))
+    moved = body.solve(body.expansion_load @ (10.0 * body.section.mesh.p[1]))
     side = body.side_at(z, r)
     middle = body.middle_of(side)
     along = body.mean_shift(side, (1.0, 0.0, 0.0)) @ moved + middle[1] * (turn @ moved)

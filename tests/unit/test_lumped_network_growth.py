@@ -37,7 +37,7 @@ def test_a_field_on_fine_cells_moves_seats_as_elasticity_has_it(networks):
     network = networks[3]
     bodies = machine_bodies(network.spec)
     housing = bodies.bodies[bodies.housing]
-    shift = housing.solve(housing.expansion_load() @ (100.0 * (housing.section.mesh.p[1] - 82.5e-3)))
+    shift = housing.solve(housing.expansion_load @ (100.0 * (housing.section.mesh.p[1] - 82.5e-3)))
     cells, node = network.cells, network.partition.node_of_cell
     # parts turn or stand: outside the housing everything stays as assembled
     own = np.isin(np.array(cells.part_names)[cells.part], bodies.parts[bodies.housing])

@@ -63,7 +63,7 @@ def deformed_shapes(
         push = np.array([inwards * model.rings[i].seat.face.area * pressing[0, i] for i in own])
         shift = _thermal(model, name, temperature) + outputs.solutions @ push
         if name == model.bodies.shaft:
-            shift = shift + outputs.body.solve(outputs.body.spin_load()) * speed**2
+            shift = shift + outputs.body.solve(outputs.body.spin_load) * speed**2
         seat = model.holding_seat(name)
         at_seat = None if seat is None else outputs.body.mean_shift(seat, AXIAL) @ shift
         layout = Layout(model.spec, set())
@@ -81,7 +81,7 @@ def deformed_shapes(
             ring.areas * pressing[:, index]
         )
         if ring.seat.is_inner:
-            shift = shift + body.solve(body.spin_load()) * speed**2
+            shift = shift + body.solve(body.spin_load) * speed**2
         carrier = model.bodies.bodies[ring.seat.carrier]
         under = carrier.mean_shift(ring.seat.face, AXIAL) @ found[ring.seat.carrier]
         own = body.mean_shift(ring.seat.face, AXIAL)
@@ -98,7 +98,7 @@ def _spacer_shape(
     """A spacer at its temperatures, free, in the middle between the rings that it touches."""
     body, apart = spacer.body, []
     rise = spacer.temperatures.corner_values(temperature - model.assembly_temperature)
-    shift = body.solve(body.expansion_load() @ rise)
+    shift = body.solve(body.expansion_load @ rise)
     for ring in model.rings:
         for end in spacer_ends(spacer.part):
             touches = min(abs(end.z[0] - z) for z in ring.seat.face.z) < TOUCHING
@@ -112,7 +112,7 @@ def _spacer_shape(
 def _thermal(model: GrowthModel, name: str, temperature: Array) -> Array:
     body = model.bodies.bodies[name]
     rise = model.fields[name].corner_values(temperature - model.assembly_temperature)
-    return body.solve(body.expansion_load() @ rise)
+    return body.solve(body.expansion_load @ rise)
 
 
 def _moved(body: ElasticBody, shift: Array, distance: float) -> Array:

@@ -109,6 +109,7 @@ class ElasticBody:
         found[free] = factor.solve(load[free])
         return found
 
+    @cached_property
     def spin_load(self) -> Array:
         """Centrifugal load of 1 rad/s, to be multiplied by the speed squared, N s²."""
         density = np.broadcast_to(self.coefficients["density"], self.basis.dx.shape)
@@ -140,8 +141,17 @@ class ElasticBody:
         weight = basis.dx * r / float(np.sum(basis.dx * r))
         return float(np.sum(weight * z)), float(np.sum(weight * r))
 
+    @cached_property
+    def _faces(self) -> dict[Face, FacetBasis]:
+        return {}
+
     def _on(self, face: Face) -> FacetBasis:
         """Sides of elements on the boundary that make up a face."""
+        if face not in self._faces:
+            self._faces[face] = self._sides(face)
+        return self._faces[face]
+
+    def _sides(self, face: Face) -> FacetBasis:
         middle = self.section.mesh.p[:, self.section.mesh.facets].mean(axis=1)
         inside = np.ones(middle.shape[1], dtype=bool)
         for values, (low, high) in zip(middle, (face.z, face.r), strict=True):
@@ -161,6 +171,7 @@ class ElasticBody:
         low, high = points[:, :, nearest].min(axis=1), points[:, :, nearest].max(axis=1)
         return Face(*zip(low.tolist(), high.tolist(), strict=True))
 
+    @cached_property
     def expansion_load(self) -> sparse.csr_array:
         """Load (n_unknowns, n_corners) of a kelvin at each corner of the section's cells, N/K."""
         corners = Basis(self.section.mesh, ElementQuad1(), quadrature=self.basis.quadrature)

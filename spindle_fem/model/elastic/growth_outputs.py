@@ -48,7 +48,7 @@ class BodyOutputs:
     @property
     def by_spin(self) -> Array:
         """Shift (k,) at 1 rad/s, m s²."""
-        return self.solutions.T @ self.body.spin_load()
+        return self.solutions.T @ self.body.spin_load
 
     def compliance(self, areas: Array) -> Array:
         """Shift of every output by a pressure on the face of each, (k, k) m/Pa.
@@ -62,4 +62,4 @@ class BodyOutputs:
 
     def by_temperature(self) -> Array:
         """Shift (k, n_corners) of every output by a kelvin at each corner of the section's cells, m/K."""
-        return (self.body.expansion_load().T @ self.solutions).T
+        return (self.body.expansion_load.T @ self.solutions).T
