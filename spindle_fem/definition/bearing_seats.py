@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Literal
 
@@ -11,6 +12,8 @@ from spindle_fem.errors import SpecError, SpindleFemError
 
 # An interference beyond this share of the diameter yields the ring (Harris: about 1e-3 at most)
 LARGEST_FIT = 2.0e-3
+# Share of a seat's diameter within which a face under its ring was to be the seat.
+MEANT_AS_SEAT = 0.05
 
 
 def seat_diameter(
@@ -48,12 +51,36 @@ def seat_faults(spec: MachineSpec, group: BearingSet) -> Iterator[SpindleFemErro
         for side, diameter in (("inner", kind.bore_diameter), ("outer", kind.outer_diameter)):
             # A seat that no face touches is told by the geometry, with the face that is nearest.
             if seat_diameter(spec, kind, bearing, side) is None and _touches(spec, diameter, bearing):
+                key, near = _nearest_face(spec, diameter, bearing, side)
+                if abs(near - diameter) < MEANT_AS_SEAT * diameter:
+                    yield SpecError(
+                        key,
+                        f"the {side} ring of {bearing.name} sits on no part: this face has {near * 1e3:g} mm, "
+                        f"its seat {diameter * 1e3:g} mm.",
+                        f"Allowed: {diameter * 1e3:g} mm.",
+                    )
+                    continue
                 yield SpecError(
                     f"bearing_set.{group.name}.fit",
                     f"the {side} ring of {bearing.name} sits on no part: none that "
                     f"{'turns' if side == 'inner' else 'stands'} has a face of {diameter * 1e3:g} mm there.",
                     "Allowed: rings on a rotating and a standing part; or leave the fit out.",
                 )
+
+
+def _nearest_face(
+    spec: MachineSpec, diameter: float, bearing: SetBearing, side: Literal["inner", "outer"]
+) -> tuple[str, float]:
+    """Key and diameter [m] of the face under a ring that is nearest to its seat's; infinite where none is."""
+    middle = 0.5 * (bearing.z[0] + bearing.z[1])
+    kind = "outer_diameter" if side == "inner" else "inner_diameter"
+    faces = [
+        (f"part.{part.name}.segment.{segment.name}.{kind}", getattr(segment, kind))
+        for part in spec.part
+        for segment in part.segment
+        if part.rotating == (side == "inner") and segment.z[0] <= middle <= segment.z[1]
+    ]
+    return min(faces, key=lambda face: abs(face[1] - diameter), default=("", math.inf))
 
 
 def _touches(spec: MachineSpec, diameter: float, bearing: SetBearing) -> bool:
