@@ -55,8 +55,8 @@ def seat_faults(spec: MachineSpec, group: BearingSet) -> Iterator[SpindleFemErro
                 if abs(near - diameter) < MEANT_AS_SEAT * diameter:
                     yield SpecError(
                         key,
-                        f"the {side} ring of {bearing.name} sits on no part: this face has {near * 1e3:g} mm, "
-                        f"its seat {diameter * 1e3:g} mm.",
+                        f"the {side} ring of {bearing.name} sits on no part: this face "
+                        f"has {near * 1e3:g} mm, its seat {diameter * 1e3:g} mm.",
                         f"Allowed: {diameter * 1e3:g} mm.",
                     )
                     continue

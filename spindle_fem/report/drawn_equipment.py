@@ -22,6 +22,8 @@ from spindle_fem.report.figure_style import INK
 from spindle_fem.report.meridian_axes import MM, box
 
 HEAT_COLOUR = "#c1121f"
+# A stand on the frame is drawn that much further out than the flange.
+FRAME_BESIDE = 1.02
 _GROOVES = ("groove", "grooves")
 Span = tuple[float, float]
 
@@ -123,14 +125,15 @@ def _readable(name: str) -> str:
 
 
 def draw_sensors(axes: Axes, spec: MachineSpec, assembly: AssemblyGeometry) -> None:
-    """Displacement sensors: a square on the mount, an arrow to the spot that they look at."""
+    """Displacement sensors: a square on the mount, open on a frame, and an arrow to the spot they look at."""
     for sensor in spec.displacement_sensor:
         target, mount = sensor_spot(sensor, assembly), _mount_spot(sensor, spec, assembly)
         if target is None or mount is None:
             continue
         arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.0, "linestyle": (0, (4, 2))}
         axes.annotate("", target, mount, arrowprops=arrow | {"shrinkA": 0.0, "shrinkB": 0.0}, zorder=6)
-        axes.plot(*mount, marker="s", markersize=6.5, color=INK, zorder=6)
+        inside = "none" if sensor.mount == FRAME else INK
+        axes.plot(*mount, marker="s", markersize=6.5, color=INK, markerfacecolor=inside, zorder=6)
 
 
 def sensor_spot(sensor: DisplacementSensor, assembly: AssemblyGeometry) -> tuple[float, float] | None:
@@ -152,7 +155,10 @@ def _middle(surface: str, assembly: AssemblyGeometry) -> tuple[float, float] | N
 def _mount_spot(
     sensor: DisplacementSensor, spec: MachineSpec, assembly: AssemblyGeometry
 ) -> tuple[float, float] | None:
-    """What holds a sensor, mm; None on a frame beside the machine."""
+    """What holds a sensor, mm: of a frame a spot just beside the flange in the plane that it is bolted to.
+
+    None on a flange or a frame of a machine whose flange is not known.
+    """
     if not isinstance(sensor.mount, str):
         return sensor.mount.z * MM, sensor.mount.radius * MM
     surface = _middle(sensor.mount, assembly)
@@ -160,6 +166,7 @@ def _mount_spot(
         return surface
     layout = Layout(spec, set())
     segments = [s for s in layout.housing.segment if s.name == layout.flange] if layout.housing else []
-    if sensor.mount == FRAME or not segments:
+    if not segments:
         return None
-    return segments[0].z[1] * MM, 0.5 * segments[0].outer_diameter * MM
+    beside = FRAME_BESIDE if sensor.mount == FRAME else 1.0
+    return segments[0].z[1] * MM, 0.5 * beside * segments[0].outer_diameter * MM

@@ -102,8 +102,8 @@ def test_rings_that_nothing_touches_are_told_once_and_with_the_face_that_is_near
                 "part.shaft.segment.front_seat.outer_diameter=139.8 mm",
                 "part.front_inner_spacer.segment.ring.z=['92 mm', '113 mm']",
             ],
-            "part.shaft.segment.front_seat.outer_diameter: the inner ring of F2 sits on no part: this face has "
-            "139.8 mm, its seat 140 mm. Allowed: 140 mm.",
+            "part.shaft.segment.front_seat.outer_diameter: the inner ring of F2 sits on no part: this face "
+            "has 139.8 mm, its seat 140 mm. Allowed: 140 mm.",
         ),
         (["materials.cast_iron.thermal_expansion=12 K"], "thermal_expansion"),
         (

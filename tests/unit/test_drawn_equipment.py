@@ -70,11 +70,16 @@ def test_sources_are_hatched_and_told_and_sensors_drawn_with_their_mount():
     assert [(*line.get_xdata(), *line.get_ydata()) for line in squares] == [(60.0, 140.0)]
 
 
-def test_a_sensor_on_a_frame_has_no_mount_on_the_machine():
+def test_a_sensor_on_a_frame_stands_beside_the_flange():
     spec = with_sensor(mount="frame")
     axes = Figure().subplots()
     drawn_equipment.draw_sensors(axes, spec, build_assembly(spec))
-    assert not axes.lines
+    (square,) = axes.lines
+    assert square.get_markerfacecolor() == "none"
+    # in the plane behind the flange, outside its 280 mm
+    assert (*square.get_xdata(), *square.get_ydata()) == pytest.approx((60.0, 142.8))
+    (arrow,) = axes.texts
+    assert arrow.xy == (0.0, 40.0)
 
 
 def test_faces_behind_a_section_cover_its_cracks():
