@@ -18,7 +18,15 @@ from spindle_fem.inference.coarse_machine import refined
 from spindle_fem.inference.diagnosis import MOST_WORKERS, Diagnosis, diagnose_recordings
 from spindle_fem.inference.diagnosis_content import diagnosis_content, plain_data, unexplained_content
 from spindle_fem.inference.findings import predictions_at_stamps, states_of
-from spindle_fem.inference.full_model_check import AUTO, OFF, full_model_errors, nothing_run, require_choice
+from spindle_fem.inference.full_model_check import (
+    AUTO,
+    OFF,
+    BegunFit,
+    begin_fit,
+    full_model_errors,
+    nothing_run,
+    require_choice,
+)
 from spindle_fem.inference.full_model_confirmation import with_confirmation
 from spindle_fem.inference.improved_machine import improved_machine
 from spindle_fem.inference.next_measurement import next_measurement
@@ -131,7 +139,16 @@ def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
         else:
             workers = Workers(min(thread_count(), MOST_WORKERS))
             workers.wake()
-            diagnosis = diagnose_recordings(opened, heldout=request.heldout, progress=tell, workers=workers)
+            begun: list[BegunFit] = []
+            diagnosis = diagnose_recordings(
+                opened,
+                heldout=request.heldout,
+                progress=tell,
+                workers=workers,
+                fitted_without=lambda plant, fit: begun.extend(
+                    begin_fit(opened, plant, fit, request.full_model)
+                ),
+            )
             tell("writing")
             replace_text(place / "machine.toml", definition)
             proposed = workers.ahead(partial(next_measurement, diagnosis))
@@ -142,6 +159,7 @@ def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
                 diagnosis,
                 opened,
                 mesh=request.full_model,
+                begun=next(iter(begun), None),
                 keep=lambda name, predicted: _write_predictions(
                     diagnosis, place, f"{name}_full_model", predicted
                 ),

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.like_sets import may_stand_for
+from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
 from spindle_fem.inference.opened_machine import DiagnosedMachine
@@ -123,6 +125,7 @@ def diagnose_recordings(
     heldout: str = "blocks",
     progress: Progress = lambda stage: None,
     workers: Workers | None = None,
+    fitted_without: Callable[[Predictor, Fit], None] = lambda predictor, fit: None,
 ) -> Diagnosis:
     """Diagnose a machine's recordings.
 
@@ -132,6 +135,8 @@ def diagnose_recordings(
         As :func:`heldout_stamps` takes it.
     workers : Workers, optional
         Processes that fit, by default as many as threads are given; the result does not depend on it.
+    fitted_without : callable
+        Gets the fit of nothing missing, and its predictor, once it is known.
     """
     clock = _Clock()
     fast, view = machine.fast, machine.view
@@ -145,19 +150,18 @@ def diagnose_recordings(
     if calibration:
         earlier = Predictor(fast, calibration, effects=machine.effects).with_unseen(unseen)
     directions = misdescriptions_of(predictor)
+    calibrating = workers.ahead(partial(_calibrated, earlier, predictor, directions))
     predictor = with_misdescriptions(predictor, directions)
-    if earlier is not None:
-        earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
-    calibrated = calibrate(earlier, predictor)
+    candidates = candidates_for(view)
+    small, known = searched_predictor(predictor, view, candidates)
+    calibrated = calibrating()
     if earlier is not None and machine.is_network:
         belief = calibrated.belief
         fitted = {c.name: c.at(u) for c, u in zip(belief.coordinates, belief.mean, strict=True)}
-        predictor = with_misdescriptions(predictor, directions, fitted)
+        small = predictor = with_misdescriptions(predictor, directions, fitted)
     clock.lap("calibration")
-    candidates = candidates_for(view)
     effects = catalogue()
     weights = {name: effect.prior_weight for name, effect in effects.items()}
-    small, known = searched_predictor(predictor, view, candidates)
     problem = Problem(small, calibrated.known, calibrated.slow, small.observations)
     if directions:
         # Their columns, about the machine as its recordings show it.
@@ -186,6 +190,9 @@ def diagnose_recordings(
     unchanged = predictor
     if machine.is_network:
         unchanged = with_misdescriptions(predictor, directions, empty.fit.values)
+    # Nothing missing is the likelier of what directions do about its own run and about that of the set.
+    plain = Problem(unchanged, belief, slow, predictor.observations)
+    own_fit = workers.ahead(partial(plain.fit, (), empty.fit.values))
     notes: tuple[str, ...] = ()
     if directions:
         # A set changes what directions do; calibration knows them by what they did without it.
@@ -196,9 +203,7 @@ def diagnose_recordings(
     final = Problem(predictor, belief, slow, predictor.observations)
     overlapping = overlapping_components(view)
     refitted = _refit(final, found, workers, overlapping, FollowedReadings(final, final), coarseness)
-    # Nothing missing is the likelier of what directions do about its own run and about that of the set.
-    plain = Problem(unchanged, belief, slow, predictor.observations)
-    own = plain.fit((), empty.fit.values)
+    own = own_fit()
     after = next(h.fit for h in refitted if not h.fit.candidates)
     if after.misfit_with_prior < own.misfit_with_prior:
         unchanged, plain, own = predictor, final, after
@@ -206,6 +211,7 @@ def diagnose_recordings(
         # Columns that mislead nothing missing mislead a set too: those about nothing missing then serve all.
         predictor, final = unchanged, plain
         refitted = _refit(final, found, workers, overlapping, FollowedReadings(final, final), coarseness)
+    fitted_without(unchanged, own)
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
     readings = FollowedReadings(final, plain, lambda fit: inferred_states(search, final, fit))
     refitted = with_own_noise(plain, readings.residuals, readings.kept(refitted))
@@ -258,6 +264,15 @@ def diagnose_recordings(
         followed,
         notes,
     )
+
+
+def _calibrated(
+    earlier: Predictor | None, predictor: Predictor, directions: Sequence[Misdescription]
+) -> Calibrated:
+    """What is known of a machine on the recordings to be diagnosed, from those of its calibration if any."""
+    if earlier is not None:
+        earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
+    return calibrate(earlier, predictor.misdescribed_by(directions, {}))
 
 
 def _begun_with_more(problem: Problem, item: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis:

@@ -7,25 +7,21 @@ reduction.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Candidate
-from spindle_fem.effects.framework.term import COVARIATE
 from spindle_fem.errors import SpecError, SpindleFemError, WorkerDiedError
 from spindle_fem.inference import tuned
-from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, FIRST_ORDER
+from spindle_fem.inference.coordinate_names import FIRST_ORDER
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import (
-    at_stamps,
     channel_errors,
     channel_noise,
     displacement_errors,
@@ -33,18 +29,22 @@ from spindle_fem.inference.findings import (
     rmse,
 )
 from spindle_fem.inference.full_model_confirmation import left_by_both
+from spindle_fem.inference.full_model_runs import (
+    FullFit,
+    MeshRuns,
+    alone,
+    finished,
+    inputs_of_drive,
+    mesh_runs,
+    run_fit,
+)
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.model.reduced.drive import Drive
-from spindle_fem.parallel import WorkerPool, one_thread, thread_count
-from spindle_fem.recordings.displaced_readings import MICROMETRES
-from spindle_fem.recordings.input_samples import InputHistory
+from spindle_fem.parallel import in_copies, start_copy, thread_count
 from spindle_fem.solvers.input_history import OperatingHistory
-from spindle_fem.solvers.machine_transient import simulate_full, start_at
-from spindle_fem.solvers.mesh_terms import Physics
 from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
-from spindle_fem.solvers.transient_records import MachineTransient, TransientOptions, balanced
+from spindle_fem.solvers.transient_records import TransientOptions, balanced
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -72,23 +72,46 @@ Keep = Callable[[str, tuple[Array, ...]], None]
 
 
 @dataclass(frozen=True, slots=True)
-class FullFit:
-    """One fit simulated by the full model.
+class BegunFit:
+    """A fit whose runs on the coarse mesh were begun in another process, before it was asked for.
 
     Attributes
     ----------
-    predicted : tuple of (N, c) ndarray, [K]
-        What every channel of every recording should read, at its stamps; of a displacement in µm, from the
-        sensor's zero.
-    steps : int
-        Time steps over all recordings.
-    seconds : float, [s]
-        That it took.
+    options : TransientOptions
+    wait : callable
+        Gives the runs.
     """
 
-    predicted: tuple[Array, ...]
-    steps: int
-    seconds: float
+    fit: Fit
+    options: TransientOptions
+    wait: Callable[[], MeshRuns]
+
+    def serves(self, fit: Fit, mesh: str, options: TransientOptions) -> bool:
+        """Whether its runs are those of a fit: what the reduced model supplies is none of theirs."""
+        return mesh == COARSE and options == self.options and _on_mesh(fit) == _on_mesh(self.fit)
+
+
+def _on_mesh(fit: Fit) -> tuple[tuple[Candidate, ...], dict[str, float]]:
+    """Candidates of a fit, and its values that a run on the mesh depends on."""
+    return fit.candidates, {n: value for n, value in fit.values.items() if not n.startswith(FIRST_ORDER)}
+
+
+def begin_fit(machine: DiagnosedMachine, predictor: Predictor, fit: Fit, mesh: str = AUTO) -> list[BegunFit]:
+    """Begin the runs of a fit that :func:`full_model_errors` will probably need; none where it will not.
+
+    Parameters
+    ----------
+    mesh : {"auto", "off", "coarse", "own"}
+        As there.
+    """
+    if mesh not in (AUTO, COARSE) or machine.is_network or thread_count() == 1:
+        return []
+    options = options_for(predictor)
+    if mesh == AUTO and expected_steps(predictor, options) > MOST_STEPS:
+        return []
+    spec = spec_on(machine.spec, COARSE)
+    runs = start_copy(lambda: alone(mesh_runs, prepare_machine(spec), predictor, fit, options))
+    return [BegunFit(fit, options, runs)]
 
 
 def require_choice(choice: str) -> str:
@@ -117,6 +140,7 @@ def full_model_errors(
     *,
     mesh: str = AUTO,
     options: TransientOptions | None = None,
+    begun: BegunFit | None = None,
     keep: Keep = lambda name, predicted: None,
     progress: Progress = lambda stage: None,
 ) -> dict[str, Any]:
@@ -132,6 +156,8 @@ def full_model_errors(
         the recordings need very many time steps.
     options : TransientOptions, optional
         How accurately time is followed; :func:`options_for` when absent.
+    begun : BegunFit, optional
+        Of :func:`begin_fit`, which serves where a fit is the same.
     keep : callable
         Gets ``before`` or ``after`` and its predictions.
 
@@ -168,7 +194,9 @@ def full_model_errors(
             )
         mesh = COARSE
     try:
-        return balanced(lambda asked: _both_fits(diagnosis, machine, mesh, asked, keep, progress), options)
+        return balanced(
+            lambda asked: _both_fits(diagnosis, machine, mesh, asked, begun, keep, progress), options
+        )
     except SpindleFemError as error:
         return nothing_run(mesh, f"It could not be run: {error}")
 
@@ -206,6 +234,7 @@ def _both_fits(
     machine: DiagnosedMachine,
     mesh: str,
     options: TransientOptions,
+    begun: BegunFit | None,
     keep: Keep,
     progress: Progress,
 ) -> dict[str, Any]:
@@ -216,6 +245,10 @@ def _both_fits(
     if _is_same(*fits.values()):
         progress("full model: before, which is after")
         runs = dict.fromkeys(fits, run_fit(prepared, predictor, diagnosis.null, options))
+    elif begun is not None and begun.serves(diagnosis.null, mesh, options):
+        progress("full model: after, before was begun")
+        after = alone(run_fit, prepared, predictor, diagnosis.final, options)
+        runs = {"before": finished(predictor, diagnosis.null, begun.wait()), "after": after}
     elif mesh == COARSE and thread_count() > 1:
         runs = _side_by_side(prepared, predictor, fits, options, progress)
     else:
@@ -260,65 +293,6 @@ def spec_on(spec: MachineSpec, mesh: str) -> MachineSpec:
     return spec.model_copy(update={"mesh": spec.mesh.model_copy(update=COARSE_MESH)})
 
 
-def run_fit(machine: PreparedMachine, predictor: Predictor, fit: Fit, options: TransientOptions) -> FullFit:
-    """Run all recordings through the full model with the parameters and candidates of a fit.
-
-    Raises
-    ------
-    NoSteadyStateError, ConvergenceError, EnergyBalanceError
-    """
-    began = time.perf_counter()
-    predicted, steps = [], 0
-    for number in range(len(predictor.recordings)):
-        run = _run(machine, predictor, number, fit, options)
-        steps += len(run.steps.times)
-        predicted.append(at_stamps(predictor, number, _readings(predictor, number, fit, run)))
-    return FullFit(tuple(predicted), steps, time.perf_counter() - began)
-
-
-def inputs_of_drive(drive: Drive, followed: Collection[str] = ()) -> InputHistory:
-    """The inputs of a drive as the full model takes them, and of its covariates those that are followed.
-
-    Inputs that are constant on every step are held, others joined by straight lines.
-    """
-    columns = [i for i, name in enumerate(drive.names) if not name.startswith(COVARIATE) or name in followed]
-    start, end = drive.start[:, columns], drive.end[:, columns]
-    names = tuple(drive.names[i] for i in columns)
-    return InputHistory(drive.grid, names, np.vstack((start, end[-1:])), np.all(start == end, axis=0))
-
-
-def physics_of_fit(predictor: Predictor, number: int, fit: Fit) -> Physics:
-    """Terms and factors of a fit, those of the definition included, in one recording.
-
-    Parameters
-    ----------
-    number : int
-        Recording.
-    """
-    acting = _acting(fit.candidates, number)
-    values = fit.values
-    terms = [*predictor.effects.terms, *(term for item in acting for term in item.terms)]
-    of_terms = {
-        name: values.get(name, item.value)
-        for candidate in acting
-        for term in candidate.terms
-        for name, item in term.names().items()
-    }
-    # Values that belong to a candidate are factors only if it declares so.
-    of_candidates = {
-        name for c in fit.candidates for name in c.parameters if name not in {item.name for item in c.factors}
-    }
-    scaled = {EFFECT_PREFIX + item.name: item.name for c in acting for item in c.factors}
-    factors = dict(predictor.effects.factors)
-    for name, value in values.items():
-        own = scaled.get(name)
-        if own is None and not (name in of_candidates or name.startswith((*FIRST_ORDER, EFFECT_PREFIX))):
-            own = name
-        if own is not None:
-            factors[own] = factors.get(own, 1.0) * value
-    return Physics(tuple(terms), of_terms, factors)
-
-
 # -------------------------------------------------------------------- details
 def _one_by_one(
     machine: PreparedMachine,
@@ -343,62 +317,17 @@ def _side_by_side(
 ) -> dict[str, FullFit]:
     """Each fit in its own process; in this one, with a warning, if a process ends prematurely."""
     progress(f"full model: {' and '.join(fits)}")
-    jobs = [partial(_run_alone, machine.spec, predictor, fit, options) for fit in fits.values()]
+    jobs = [partial(alone, run_fit, machine, predictor, fit, options) for fit in fits.values()]
     try:
-        answers = WorkerPool(len(fits)).map(jobs, [f"full model: {name}" for name in fits])
+        answers = in_copies(jobs, len(fits))
     except WorkerDiedError as error:
         progress(f"{error.where}: {error.what}")
         return _one_by_one(machine, predictor, fits, options, progress)
     return dict(zip(fits, answers, strict=True))
 
 
-def _run_alone(spec: MachineSpec, predictor: Predictor, fit: Fit, options: TransientOptions) -> FullFit:
-    with threadpool_limits(1), one_thread():
-        return run_fit(prepare_machine(spec), predictor, fit, options)
-
-
 def _is_same(one: Fit, other: Fit) -> bool:
     return one.candidates == other.candidates and one.values == other.values
-
-
-def _acting(candidates: Sequence[Candidate], number: int) -> tuple[Candidate, ...]:
-    return tuple(item for item in candidates if item.recording in (None, number))
-
-
-def _run(
-    machine: PreparedMachine, predictor: Predictor, number: int, fit: Fit, options: TransientOptions
-) -> MachineTransient:
-    physics = physics_of_fit(predictor, number, fit)
-    inputs = inputs_of_drive(
-        predictor.drives[number], {name for term in physics.terms for name in term.follows}
-    )
-    start = start_at(machine, OperatingHistory.of(machine.spec, inputs), predictor.start(number, fit.values))
-    return simulate_full(machine, inputs, start=start, options=options, physics=physics)
-
-
-def _readings(predictor: Predictor, number: int, fit: Fit, run: MachineTransient) -> Array:
-    """Readings of every channel in a full run, on the reduced model's grid, (G + 1, c) K or µm."""
-    recording = predictor.recordings[number]
-    count = recording.temperature_count
-    temperatures = [run.reading(probe) for probe in recording.probes[:count]]
-    displacements = [MICROMETRES * run.motion_of(sensor) for sensor in recording.probes[count:]]
-    predicted = np.column_stack([*temperatures, *displacements])
-    predicted = predictor.read(number, predictor.effects.candidates, {}, predicted)
-    predicted = predicted + _first_order(predictor, number, fit)
-    return predictor.read(number, _acting(fit.candidates, number), fit.values, predicted)
-
-
-def _first_order(predictor: Predictor, number: int, fit: Fit) -> Array | float:
-    """First-order changes by probe positions and gaps, before the fit's sensor effects, (G + 1, c)."""
-    if not any(name.startswith(FIRST_ORDER) for name in fit.values):
-        return 0.0
-    bare = [replace(item, reading=None) for item in fit.candidates]
-    of_bare = {name for item in bare for name in item.parameters}
-    of_readings = {name for item in fit.candidates for name in item.parameters} - of_bare
-    values = {name: value for name, value in fit.values.items() if name not in of_readings}
-    plain = {name: value for name, value in values.items() if not name.startswith(FIRST_ORDER)}
-    moved, still = (predictor.predict(number, item, bare).temperature for item in (values, plain))
-    return moved - still
 
 
 def _differences(

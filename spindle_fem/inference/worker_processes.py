@@ -9,7 +9,7 @@ from typing import Any
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference.hypothesis_fit import MOST_ITERATIONS, NOT_SIMULATED, Fit, Problem, amplitude_name
-from spindle_fem.parallel import Shared, WorkerPool
+from spindle_fem.parallel import Shared, WorkerPool, can_be_copied, in_copies, start_copy
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +62,13 @@ class Workers:
     """
 
     def __init__(self, number: int = 1) -> None:
-        self._pool = WorkerPool(number)
+        self._number, self._pool = number, WorkerPool(number)
         self._shared: Shared[Problem] | None = None
 
     def wake(self) -> None:
-        """Start the other processes, which takes them seconds, while this one has other things to do."""
-        self._pool.wake()
+        """Start the other processes, where that takes them seconds, while this one has other things to do."""
+        if not can_be_copied():
+            self._pool.wake()
 
     def fits(self, problem: Problem, orders: Sequence[FitOrder]) -> list[Fit | None]:
         """Fits in the order given, with the candidates that were given."""
@@ -86,6 +87,8 @@ class Workers:
         jobs : sequence of callable
             That can be sent to another process: functions of modules, perhaps with some arguments given.
         """
+        if can_be_copied():
+            return in_copies([partial(job, problem) for job in jobs], self._number)
         if self._shared is None or self._shared.value is not problem:
             self._shared = Shared(problem)
         return self._pool.map([partial(_on_problem, self._shared, job) for job in jobs])
@@ -100,4 +103,4 @@ class Workers:
         job : callable
             That can be sent, as those of :meth:`done`.
         """
-        return self._pool.start(job)
+        return start_copy(job) if self._number > 1 and can_be_copied() else self._pool.start(job)

@@ -31,6 +31,11 @@ def _read_only(content: dict) -> types.MappingProxyType:
 ForkingPickler.register(types.MappingProxyType, lambda item: (_read_only, (dict(item),)))
 
 
+def can_be_copied() -> bool:
+    """Whether there is a core for a copy of this process, on a system that can make one."""
+    return core_count() > 1 and sys.platform.startswith("linux")
+
+
 class BackgroundProcess:
     """One object in a copy of this process, created before there is work for it.
 
@@ -59,7 +64,7 @@ class BackgroundProcess:
         self._answers: list[tuple[bool, Any]] = []
         self._here: Any = None
         self._connection: Any = None
-        if beside and core_count() > 1 and sys.platform.startswith("linux"):
+        if beside and can_be_copied():
             self._connection, self._process = _copy_of_this_process(make)
 
     def __enter__(self) -> BackgroundProcess:
@@ -145,6 +150,8 @@ def _serve(make: Callable[[], Any], connection: Any, other_end: Any) -> None:
         answers.is_dask_collection = lambda value: False
         sys.modules |= {"dask": None, "dask.base": answers}
     worker_threads._thread_count.cache_clear()
+    # and makes no copies of its own
+    worker_threads.core_count.cache_clear()
     asked: queue.SimpleQueue = queue.SimpleQueue()
 
     def read() -> None:

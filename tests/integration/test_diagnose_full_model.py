@@ -9,7 +9,8 @@ import pytest
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.registry import candidates_for, effect_of
 from spindle_fem.inference import full_model_check as full_model
-from spindle_fem.inference.full_model_check import full_model_errors, inputs_of_drive, options_for, spec_on
+from spindle_fem.inference.full_model_check import full_model_errors, options_for, spec_on
+from spindle_fem.inference.full_model_runs import inputs_of_drive
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.recordings.align import read_recording

@@ -303,7 +303,9 @@ def test_screening_is_that_of_one_process(machine, tmp_path):
     assert alone.gram[0, 0] == pytest.approx(one.gram[3, 3], rel=1e-9)
 
 
-def test_a_problem_is_sent_to_other_processes_once_and_this_one_fits_too(machine, tmp_path, monkeypatch):
+def test_without_copies_a_problem_is_sent_to_other_processes_once_and_this_one_fits_too(
+    machine, tmp_path, monkeypatch
+):
     folder = record(tmp_path / "r", 5, extra=hot)
     opened = open_machine(machine, (), [read_recording(folder)], [])
     predictor = Predictor(opened.fast, opened.recordings, effects=opened.effects)
@@ -321,6 +323,7 @@ def test_a_problem_is_sent_to_other_processes_once_and_this_one_fits_too(machine
             sent.append(item)
         return plain_dumps(item)
 
+    monkeypatch.setattr(abreast, "can_be_copied", lambda: False)
     monkeypatch.setattr(worker_pool, "_dumps", dumps)
     monkeypatch.setattr(
         abreast, "fit_order", lambda problem, order: here.append(problem) or plain_fit(problem, order)

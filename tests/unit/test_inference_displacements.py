@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from spindle_fem.effects.registry import candidates_for
-from spindle_fem.inference import full_model_check, tuned
+from spindle_fem.inference import full_model_check, full_model_runs, tuned
 from spindle_fem.inference.calibration import calibrate
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.diagnosis import diagnose_recordings
@@ -369,7 +369,7 @@ def test_the_full_model_checks_displacements_in_micrometres(heated, monkeypatch)
 
     prepared = SimpleNamespace(spec=predictor.fast.spec, operators=SimpleNamespace(n_unknowns=3))
     monkeypatch.setattr(full_model_check, "prepare_machine", lambda spec: prepared)
-    monkeypatch.setattr(full_model_check, "_run", run)
+    monkeypatch.setattr(full_model_runs, "_run", run)
     diagnosis = SimpleNamespace(predictor=predictor, null=fit, final=fit)
     machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
     kept = {}

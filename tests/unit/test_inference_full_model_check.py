@@ -11,20 +11,21 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.registry import candidates_for, effect_of
 from spindle_fem.errors import EnergyBalanceError, MeshQualityError, SpecError, WorkerDiedError
 from spindle_fem.inference import full_model_check as full_model
+from spindle_fem.inference import full_model_runs
+from spindle_fem.inference.coordinate_names import PROBE_PREFIX
 from spindle_fem.inference.findings import predictions_at_stamps
 from spindle_fem.inference.full_model_check import (
+    begin_fit,
     expected_steps,
     full_model_errors,
-    inputs_of_drive,
     options_for,
-    physics_of_fit,
     require_choice,
     spec_on,
 )
+from spindle_fem.inference.full_model_runs import inputs_of_drive, physics_of_fit
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
-from spindle_fem.parallel import WorkerPool
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.report.diagnosis_full_model import full_model_sections
 from spindle_fem.solvers.input_history import OperatingHistory
@@ -228,9 +229,9 @@ def test_a_balance_that_asks_for_a_better_fixed_point_gets_it(predictor, monkeyp
 
 
 def test_a_process_that_ends_before_its_time_is_said_and_done_without(predictor, monkeypatch):
-    def killed(self, jobs, names):
-        assert len(jobs) == self.size() == 2
-        raise WorkerDiedError(names[1], "its worker process ended before its time.")
+    def killed(jobs, number):
+        assert len(jobs) == number == 2
+        raise WorkerDiedError("full model: after", "its process ended before its time.")
 
     def run_fit(machine, predictor, fit, options):
         return full_model.FullFit(tuple(predictions_at_stamps(predictor, fit)), 7, 1.0)
@@ -239,14 +240,44 @@ def test_a_process_that_ends_before_its_time_is_said_and_done_without(predictor,
     monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
     monkeypatch.setattr(full_model, "run_fit", run_fit)
     monkeypatch.setattr(full_model, "thread_count", lambda: 2)
-    monkeypatch.setattr(WorkerPool, "map", killed)
+    monkeypatch.setattr(full_model, "in_copies", killed)
     machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
     nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
     said = []
     found = full_model_errors(diagnosis_of(predictor, nothing, heat), machine, progress=said.append)
-    assert "full model: after: its worker process ended before its time." in said
+    assert "full model: after: its process ended before its time." in said
     assert said[-2:] == ["full model: before", "full model: after"]
     assert found["after"]["train_rmse_K"] != found["before"]["train_rmse_K"]
+
+
+def test_a_fit_that_was_begun_is_run_once(predictor, monkeypatch):
+    nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
+    moved = fit_of((), {"heat.front": 1.1, f"{PROBE_PREFIX}SP01.x": 1e-4})
+    ran = []
+
+    def mesh_runs(machine, predictor, fit, options):
+        ran.append(fit)
+        seen = [predictor.predict(number, fit.values).temperature for number in range(1)]
+        return full_model_runs.MeshRuns(tuple(seen), 7, 1.0)
+
+    prepared = SimpleNamespace(spec=predictor.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
+    for module in (full_model, full_model_runs):
+        monkeypatch.setattr(module, "mesh_runs", mesh_runs)
+    monkeypatch.setattr(full_model, "thread_count", lambda: 2)
+    monkeypatch.setattr(full_model, "start_copy", lambda job: job)
+    monkeypatch.setattr(full_model, "in_copies", lambda jobs, number: [job() for job in jobs])
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
+    assert [begin_fit(machine, predictor, nothing, mesh) for mesh in ("off", "own")] == [[], []]
+    (begun,) = begin_fit(machine, predictor, nothing)
+    assert begun.serves(moved, "coarse", begun.options)
+    assert not begun.serves(heat, "coarse", begun.options)
+    assert not begun.serves(nothing, "own", begun.options)
+    assert not begun.serves(nothing, "coarse", replace(begun.options, error=0.5))
+    diagnosis = diagnosis_of(predictor, nothing, heat)
+    with_begun, without = (full_model_errors(diagnosis, machine, begun=item) for item in (begun, None))
+    assert repr(with_begun) == repr(without)
+    assert ran == [heat, nothing, nothing, heat]
 
 
 def test_a_difference_of_the_meshes_is_not_one_of_what_was_found(predictor, monkeypatch):

@@ -15,7 +15,7 @@ import pytest
 import spindle_fem
 from spindle_fem import parallel
 from spindle_fem.errors import BadInputError, WorkerDiedError
-from spindle_fem.parallel import BackgroundProcess, Shared, WorkerPool, worker_pool
+from spindle_fem.parallel import BackgroundProcess, Shared, WorkerPool, in_copies, start_copy, worker_pool
 
 SEVERAL_CORES = parallel.core_count() > 1
 
@@ -257,6 +257,45 @@ def test_a_background_process_ends_with_the_one_that_started_it(tmp_path):
     assert not _runs(other)
 
 
+# ------------------------------------------------------------------ copies of this process
+def test_copies_answer_in_the_order_of_the_jobs_and_nothing_is_sent_to_them():
+    senders = []
+    jobs = [partial(lambda told, number: (number, os.getpid()), Told(senders), number) for number in range(5)]
+    for number in (1, 2):
+        answers = in_copies(jobs, number)
+        assert [place for place, _ in answers] == [0, 1, 2, 3, 4]
+        assert {process for _, process in answers} == {os.getpid()} or number > 1
+    assert senders == []
+    assert in_copies([], 2) == []
+
+
+@pytest.mark.skipif(not SEVERAL_CORES, reason="works in this process on one core")
+def test_a_copy_works_beside_this_process_and_makes_no_copies_of_its_own():
+    def where():
+        return os.getpid(), in_copies([os.getpid, os.getpid], 2), parallel.thread_count()
+
+    process, inner, threads = start_copy(where)()
+    assert process != os.getpid()
+    assert inner == [process, process]
+    assert threads == 1
+
+
+def test_errors_and_answers_that_are_functions_come_from_copies():
+    with pytest.raises(BadInputError, match="it was refused"):
+        in_copies([refuse] * 3, 2)
+    waiting = start_copy(refuse)
+    with pytest.raises(BadInputError, match="it was refused"):
+        waiting()
+    double, triple = in_copies([lambda: lambda x: 2 * x, lambda: lambda x: 3 * x], 2)
+    assert (double(2), triple(2)) == (4, 6)
+
+
+@pytest.mark.skipif(not SEVERAL_CORES, reason="works in this process on one core")
+def test_a_copy_that_dies_is_an_error():
+    with pytest.raises(WorkerDiedError, match="its process ended before its time"):
+        start_copy(partial(die_beside, os.getpid()))()
+
+
 def _runs(pid):
     try:
         return Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z"
@@ -278,6 +317,7 @@ def test_nothing_else_starts_threads_or_processes():
     }
     assert found == {
         "parallel/background_process.py",
+        "parallel/process_copies.py",
         "parallel/worker_pool.py",
         "parallel/worker_threads.py",
     }
