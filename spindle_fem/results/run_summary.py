@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from spindle_fem.model.elastic.solid_growth import SolidGrowth
 
 SUMMARY_SCHEMA = "spindle-fem/summary/1"
+# The ring of a bearing that sits on each of the two.
+RING_ON = {"shaft": "inner", "housing": "outer"}
 _PACKAGES = (
     "spindle-fem",
     "numpy",
@@ -103,7 +105,7 @@ def build_summary(
                 "max_degC": result.temperature_maximum - ZERO_CELSIUS_K,
                 "max_at_mm": maximum_mm,
             },
-            **({} if growth is None else _growth(growth, result.solid_growth)),
+            **({} if growth is None else _growth(result, growth)),
             "displacements": {name: 1e6 * value for name, value in displacements.items()},
             **({} if result.equilibrium is None else {"equilibrium": _equilibrium(result.equilibrium)}),
             "joints": {name: {"heat_W": value} for name, value in result.heat_flows.items()},
@@ -189,8 +191,9 @@ def _circuit(circuit: CircuitResult) -> dict[str, Any]:
     }
 
 
-def _growth(growth: Growth, solid: SolidGrowth | None) -> dict[str, Any]:
+def _growth(result: ThermalResult, growth: Growth) -> dict[str, Any]:
     """Blocks ``growth`` and ``fits``, lengths in µm."""
+    solid = result.solid_growth
     fits: dict[str, dict[str, dict[str, float]]] = {}
     for (bearing, side), state in growth.seats.items():
         fits.setdefault(bearing, {})[side] = {
@@ -199,9 +202,16 @@ def _growth(growth: Growth, solid: SolidGrowth | None) -> dict[str, Any]:
         }
     seats = {key: state.seat_growth for key, state in growth.seats.items()}
     raceways = {key: state.raceway_growth for key, state in growth.seats.items()}
+    shape = _shape(growth, seats, raceways)
+    for (bearing, side), motion in result.raceway_motions.items():
+        ring = RING_ON[side]
+        shape["raceways"][bearing] |= {
+            f"{ring}_axial_um": 1e6 * motion.axial,
+            f"{ring}_twist_urad": 1e6 * motion.twist,
+        }
     return {
         "growth": {
-            **_shape(growth, seats, raceways),
+            **shape,
             "spacers": {name: {"length_um": 1e6 * value} for name, value in growth.spacers.items()},
             **({} if solid is None else {"three_dimensional": _solid_shape(solid)}),
         },
@@ -227,8 +237,7 @@ def _shape(
         "seats": {},
     }
     for (bearing, side), value in raceways.items():
-        ring = "inner" if side == "shaft" else "outer"
-        found["raceways"].setdefault(bearing, {})[f"{ring}_um"] = 1e6 * value
+        found["raceways"].setdefault(bearing, {})[f"{RING_ON[side]}_um"] = 1e6 * value
     for (bearing, side), value in seats.items():
         found["seats"].setdefault(bearing, {})[f"{side}_um"] = 1e6 * value
     return found

@@ -18,8 +18,8 @@ from spindle_fem.units import ZERO_CELSIUS_K
 if TYPE_CHECKING:
     from spindle_fem.definition.machine_spec import MachineSpec
     from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
-    from spindle_fem.model.elastic.deformed_shape import BodyShape
-    from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel
+    from spindle_fem.model.elastic.deformed_shape import BodyShape, RacewayMotion
+    from spindle_fem.model.elastic.machine_growth import Growth, GrowthModel, Side
     from spindle_fem.model.elastic.solid_growth import SolidGrowth
     from spindle_fem.operation.bearing_heat import BearingTemperatures
     from spindle_fem.validity import CodedWarning
@@ -267,6 +267,13 @@ class ThermalResult(Presented):
             return {}
         field = self.temperature[: self.n_unknowns]
         return deformed_shapes(self._elastic, field, self.speed, self._ball_forces)
+
+    @property
+    def raceway_motions(self) -> dict[tuple[str, Side], RacewayMotion]:
+        """Axial shift and twist of every raceway, by bearing and side; empty without bearings on bodies."""
+        from spindle_fem.model.elastic.deformed_shape import raceway_motions
+
+        return raceway_motions(self._elastic, self.shapes) if self.shapes else {}
 
     @property
     def _ball_forces(self) -> dict[str, tuple[float, float]]:

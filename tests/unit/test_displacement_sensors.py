@@ -11,7 +11,7 @@ from spindle_fem.errors import BadInputError, FaultsError, SpecError
 from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.view.part_roles import Layout
-from spindle_fem.model.elastic.deformed_shape import deformed_shapes
+from spindle_fem.model.elastic.deformed_shape import deformed_shapes, raceway_motions
 from spindle_fem.model.elastic.machine_growth import GrowthModel
 
 MACHINE = """schema = "spindle-fem/machine/1"
@@ -99,6 +99,25 @@ def test_an_even_rise_moves_every_spot_by_its_distance(grown) -> None:
     assert read["S4"] == pytest.approx(12e-5 * flange.z[1], rel=1e-3)
     assert read["S2"] == pytest.approx(12e-5 * 0.090, rel=1e-3)
     assert read["S3"] == pytest.approx(read["S2"], rel=1e-6)
+
+
+def test_raceways_move_with_an_even_rise_and_turn_where_it_grows_along_the_axis(grown) -> None:
+    """α ΔT z from the flange's back, no turn; with T growing along z raceways widen like cones."""
+    spec, mesh, model = grown
+    flange = next(s for p in spec.part for s in p.segment if s.name == "flange")
+    even = np.full(mesh.n_corners, model.assembly_temperature + 10.0)
+    shapes = deformed_shapes(model, even, 0.0, model.assembly_forces)
+    for (bearing, side), motion in raceway_motions(model, shapes).items():
+        ring = next(r for r in model.rings if (r.seat.bearing, r.seat.is_inner) == (bearing, side == "shaft"))
+        middle = np.mean(ring.seat.raceway.z)
+        assert motion.axial == pytest.approx(12e-5 * (middle - max(flange.z)), abs=2e-8)
+        assert abs(motion.twist) < 1e-6
+    slope = even + 200.0 * mesh.points[: mesh.n_corners, 2]
+    shapes = deformed_shapes(model, slope, 0.0, model.assembly_forces)
+    for key, motion in raceway_motions(model, shapes).items():
+        if key[0] == "F1":
+            radius = shapes[f"F1.{'inner' if key[1] == 'shaft' else 'outer'}_ring"].points[:, 1].mean()
+            assert motion.twist == pytest.approx(12e-6 * 200.0 * radius, rel=0.3)
 
 
 def test_a_bent_housing_lifts_one_side_and_lowers_the_other(grown) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.elastic.elastic_body import ElasticBody, Face
 from spindle_fem.model.elastic.growth_outputs import AXIAL
-from spindle_fem.model.elastic.machine_growth import GrowthModel, Spacer, flange_back, holding_bearing
+from spindle_fem.model.elastic.machine_growth import GrowthModel, Side, Spacer, flange_back, holding_bearing
 from spindle_fem.model.elastic.preload_loop import TOUCHING, spacer_ends
 
 Array = NDArray[np.float64]
@@ -37,6 +38,37 @@ class BodyShape:
     cells: NDArray[np.int64]
     sides: NDArray[np.int64]
     shift: Array
+
+
+class RacewayMotion(NamedTuple):
+    """How a raceway has moved since assembly, beside its radial shift.
+
+    Attributes
+    ----------
+    axial : float, [m]
+        Mean shift towards the drive end, against :func:`still_place`.
+    twist : float, [rad]
+        Turn of the ring's section: how much more its raceway has widened each metre towards the drive end.
+    """
+
+    axial: float
+    twist: float
+
+
+def raceway_motions(
+    model: GrowthModel, shapes: Mapping[str, BodyShape]
+) -> dict[tuple[str, Side], RacewayMotion]:
+    """Motion of every raceway, by bearing and side, from the shapes of :func:`deformed_shapes`."""
+    found = {}
+    for ring in model.rings:
+        shape, radius = shapes[ring.seat.ring], ring.seat.raceway.r[0]
+        own = np.abs(shape.points[:, 1] - radius) < TOUCHING
+        z, shift = shape.points[own, 0], shape.shift[own]
+        order = np.argsort(z)
+        mean = np.trapezoid(shift[order, 0], z[order]) / np.ptp(z)
+        side: Side = "shaft" if ring.seat.is_inner else "housing"
+        found[ring.seat.bearing, side] = RacewayMotion(float(mean), float(np.polyfit(z, shift[:, 1], 1)[0]))
+    return found
 
 
 def still_place(spec: MachineSpec, *, solid: bool = False) -> str:
