@@ -11,13 +11,12 @@ from scipy import sparse
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.model.mesh.huge_pages import room
 from spindle_fem.model.mesh.kernels import column_loops
+from spindle_fem.model.mesh.kernels.row_sums import LANES
 from spindle_fem.model.mesh.linear_solvers import MAX_ITERATIONS, Operator, Preconditioner
 from spindle_fem.model.mesh.threads import row_blocks, run_blocks, unsigned
 
 # Right-hand sides iterated together: a product with so many takes twice as long as with one.
 COLUMNS_AT_ONCE = 24
-# Loops over so many columns fill vector registers; over one less they take almost twice as long.
-LANES = 8
 
 Array = NDArray[np.floating]
 # Product of a matrix with columns, written to the second argument.
@@ -85,9 +84,8 @@ def solve_many(
 
 
 def _filled(columns: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers of columns, some of them twice where that makes their number one of full registers."""
-    missing = -len(columns) % LANES
-    return columns if missing > LANES // 2 else np.resize(columns, len(columns) + missing)
+    """Numbers of columns, some of them more than once: as many as fill vector registers."""
+    return np.resize(columns, -(-len(columns) // LANES) * LANES)
 
 
 def product_of(matrix: sparse.csr_array) -> Product:

@@ -29,6 +29,7 @@ from spindle_fem.model.mesh.huge_pages import room
 from spindle_fem.model.mesh.kernels import column_loops as many
 from spindle_fem.model.mesh.kernels import multigrid_loops as loops
 from spindle_fem.model.mesh.kernels import team_loops as teams
+from spindle_fem.model.mesh.kernels.row_sums import LANES
 from spindle_fem.model.mesh.threads import (
     chunk_bounds,
     fill_rows,
@@ -138,14 +139,7 @@ class Hierarchy:
             return cho_solve(self.coarsest, residual)
         # scaled, so that small residuals stay inside the range of single precision
         if residual.ndim == 2:
-            scales = np.maximum(residual.max(axis=0, initial=0.0), -residual.min(axis=0, initial=0.0))
-            scales[scales == 0.0] = 1.0
-            spare = self._spare_columns.pop() if self._spare_columns else {}
-            right = _columns(spare, (0, "r"), residual.shape)
-            np.multiply(residual, 1.0 / scales, out=right, casting="same_kind")
-            answer = scales.astype(residual.dtype) * self._descend_many(0, right, spare)
-            self._spare_columns.append(spare)
-            return answer
+            return self._cycle_many(residual)
         scale = float(np.linalg.norm(residual)) / np.sqrt(len(residual)) or 1.0
         plan = self.plan
         # calls from several threads find vectors of their own
@@ -156,6 +150,20 @@ class Hierarchy:
             plan.coarse, plan.coarsest, work, np.ascontiguousarray(residual), scale, answer,
         )  # fmt: skip
         self._spare.append(work)
+        return answer
+
+    def _cycle_many(self, residual: NDArray) -> NDArray:
+        """One V-cycle for several columns, which fill vector registers with others that are zero."""
+        n, m = residual.shape
+        blocks = row_blocks(n)
+        scales = np.max(run_blocks(many.largest_columns, blocks, residual), axis=0)
+        scales[scales == 0.0] = 1.0
+        spare = self._spare_columns.pop() if self._spare_columns else {}
+        right = _columns(spare, (0, "r"), (n, -(-m // LANES) * LANES))
+        run_blocks(many.scale_columns, blocks, 1.0 / scales, residual, right)
+        answer = room(residual.shape, residual.dtype)
+        run_blocks(many.scale_columns, blocks, scales, self._descend_many(0, right, spare), answer)
+        self._spare_columns.append(spare)
         return answer
 
     def _descend_many(self, depth: int, right: NDArray, spare: dict[tuple[int, str], NDArray]) -> NDArray:

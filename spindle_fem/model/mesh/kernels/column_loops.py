@@ -7,36 +7,31 @@ from numba import njit
 
 from spindle_fem.model.mesh.kernels import FAST
 from spindle_fem.model.mesh.kernels.multigrid_loops import WIDTH
+from spindle_fem.model.mesh.kernels.row_sums import room_for_sums, subtract_row
 
 
 @njit(**FAST)
 def multiply_columns(low, high, starts, columns, values, vectors, out):
     """``out = A vectors`` on a range of rows."""
     m = out.shape[1]
-    sums = np.empty(m, dtype=out.dtype)
+    sums = room_for_sums(out)
     for i in range(low, high):
         for c in range(m):
             sums[c] = 0.0
-        for place in range(starts[i], starts[i + 1]):
-            j, value = columns[place], values[place]
-            for c in range(m):
-                sums[c] += value * vectors[j, c]
+        subtract_row(sums, starts[i], starts[i + 1], columns, values, vectors)
         for c in range(m):
-            out[i, c] = sums[c]
+            out[i, c] = -sums[c]
 
 
 @njit(**FAST)
 def left_over(low, high, starts, columns, values, right, vectors, out):
     """``out = right − A vectors`` on a range of rows."""
     m = out.shape[1]
-    sums = np.empty(m, dtype=out.dtype)
+    sums = room_for_sums(out)
     for i in range(low, high):
         for c in range(m):
             sums[c] = right[i, c]
-        for place in range(starts[i], starts[i + 1]):
-            j, value = columns[place], values[place]
-            for c in range(m):
-                sums[c] -= value * vectors[j, c]
+        subtract_row(sums, starts[i], starts[i + 1], columns, values, vectors)
         for c in range(m):
             out[i, c] = sums[c]
 
@@ -50,14 +45,11 @@ def smooth_columns(
     ``d₂ = keep d + add D⁻¹ (right − A d)`` is kept nowhere.
     """
     m = right.shape[1]
-    sums = np.empty(m, dtype=right.dtype)
+    sums = room_for_sums(right)
     for i in range(low, high):
         for c in range(m):
             sums[c] = right[i, c]
-        for place in range(starts[i], starts[i + 1]):
-            j, value = columns[place], values[place]
-            for c in range(m):
-                sums[c] -= value * direction[j, c]
+        subtract_row(sums, starts[i], starts[i + 1], columns, values, direction)
         of_direction, of_sum = first + second * keep, second * add * inverse[i]
         if begun:
             for c in range(m):
@@ -74,6 +66,27 @@ def scale_rows(low, high, factor, inverse, right, out):
         scale = factor * inverse[i]
         for c in range(right.shape[1]):
             out[i, c] = scale * right[i, c]
+
+
+@njit(**FAST)
+def largest_columns(low, high, vectors):
+    """Largest size in each column over a range of rows, (m,)."""
+    found = np.zeros(vectors.shape[1], dtype=vectors.dtype)
+    for i in range(low, high):
+        for c in range(found.size):
+            found[c] = max(found[c], abs(vectors[i, c]))
+    return found
+
+
+@njit(**FAST)
+def scale_columns(low, high, factor, vectors, out):
+    """``out = vectors`` times one factor a column, as far as these go, and zero in columns behind."""
+    shared = min(factor.size, out.shape[1])
+    for i in range(low, high):
+        for c in range(shared):
+            out[i, c] = factor[c] * vectors[i, c]
+        for c in range(shared, out.shape[1]):
+            out[i, c] = 0.0
 
 
 @njit(**FAST)
