@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from scipy import sparse
 
 from spindle_fem.cache import load_record, save_record
 from spindle_fem.model.matrices_on_pattern import MatricesOnPattern, sum_of
+from spindle_fem.parallel import in_threads
 
 Array = NDArray[np.float64]
 Matrix = Array | sparse.csr_array
@@ -26,6 +28,8 @@ Matrices = Sequence[sparse.csr_array] | Array
 FORMAT = "spindle-fem/thermal-model/1"
 # Fields that hold one matrix (n, n) for each coefficient.
 MATRIX_FIELDS = ("operators", "cell_film", "storage")
+# Columns of a basis that are multiplied by a sparse matrix at a time.
+COLUMNS_AT_ONCE = 32
 # Relative rounding allowed at the ends of a coefficient's range.
 RANGE_ROUNDING = 1e-9
 
@@ -217,22 +221,27 @@ def _projected(matrices: Matrices, basis: Array) -> Array:
     if isinstance(matrices, np.ndarray):
         found = np.einsum("ra,nrs,sb->nab", basis, matrices, basis, optimize=True) if len(matrices) else None
     else:
-        found = np.array([_projected_sparse(matrix, basis) for matrix in matrices])
+        jobs = [partial(_projected_sparse, matrices, index, basis) for index in range(len(matrices))]
+        found = np.array(in_threads(jobs))
     if found is None or not len(found):
         return np.zeros((0, basis.shape[1], basis.shape[1]))
     return 0.5 * (found + found.transpose(0, 2, 1))
 
 
-def _projected_sparse(matrix: sparse.csr_array, basis: Array) -> Array:
+def _projected_sparse(matrices: Sequence[sparse.csr_array], index: int, basis: Array) -> Array:
     """``Vᵀ K V``; most operators live on a surface or in a material, and only its rows are touched."""
+    matrix = matrices[index]
     own = np.flatnonzero(np.diff(matrix.indptr))
     if len(own) and own[-1] - own[0] + 1 == len(own):
         together = slice(int(own[0]), int(own[-1]) + 1)
-        return basis[together].T @ (matrix[together, together] @ basis[together])
-    if 2 * len(own) > matrix.shape[0]:
-        return basis.T @ (matrix @ basis)
-    rows = basis[own]
-    return rows.T @ (matrix[own][:, own] @ rows)
+        rows, matrix = basis[together], matrix[together, together]
+    elif 2 * len(own) > matrix.shape[0]:
+        rows = basis
+    else:
+        rows, matrix = basis[own], matrix[own][:, own]
+    # images of all columns at once would be as large as the basis
+    parts = [slice(first, first + COLUMNS_AT_ONCE) for first in range(0, basis.shape[1], COLUMNS_AT_ONCE)]
+    return np.hstack([rows.T @ (matrix @ np.ascontiguousarray(rows[:, part])) for part in parts])
 
 
 def _weighted(matrices: Matrices, weights: Sequence[float] | Array, size: int) -> Matrix:

@@ -11,7 +11,7 @@ from spindle_fem.errors import MeshQualityError, MeshTagError, SpecError
 from spindle_fem.machine.meshing.simple_bodies import build_box, build_joined_tubes
 from spindle_fem.machine.meshing.tagged_mesh import Joint
 from spindle_fem.model.mesh import element_integrals, forms, threads
-from spindle_fem.model.mesh.column_solver import solve_many
+from spindle_fem.model.mesh.column_solver import product_of, solve_many
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedNode
 from spindle_fem.model.mesh.equations import assemble_system
 from spindle_fem.model.mesh.huge_pages import room
@@ -253,6 +253,18 @@ def test_products_are_scipy_s(loops, count):
     matrix = assemble_system(problem_on(build_operators(TUBES, 1))).matrix
     vector = np.random.default_rng(9).standard_normal(matrix.shape[0])
     assert np.abs(multiply(matrix, vector) - matrix @ vector).max() < 1e-13 * np.abs(matrix @ vector).max()
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+@pytest.mark.parametrize("count", [1, 7, 8, 13, 16, 23, 24, 45])
+def test_products_with_any_number_of_columns_are_scipy_s(loops, kind, count):
+    loops(2)
+    rng = np.random.default_rng(5)
+    matrix = sparse.random_array((300, 300), density=0.05, format="csr", rng=rng, dtype=kind)
+    vectors = rng.standard_normal((300, count)).astype(kind)
+    answer = np.empty_like(vectors)
+    product_of(matrix)(vectors, answer)
+    np.testing.assert_allclose(answer, matrix @ vectors, atol=50.0 * np.finfo(kind).eps)
 
 
 def test_iterations_are_few(loops):

@@ -77,7 +77,7 @@ def combined(weights: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray
 
 def product(rows: NDArray, columns: NDArray) -> NDArray:
     """``A C`` of tall rows (n, k) and a small matrix (k, m) of one precision."""
-    answer = np.empty((len(rows), columns.shape[1]), dtype=rows.dtype)
+    answer = room((len(rows), columns.shape[1]), rows.dtype)
 
     def fill(low: int, high: int) -> None:
         np.matmul(rows[low:high], columns, out=answer[low:high])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,7 @@ from spindle_fem.operation.coefficient_table import (
 )
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.parallel import beside
 from spindle_fem.solvers.prepared_machine import prepare_machine
 
 Array = NDArray[np.float64]
@@ -222,9 +224,13 @@ def reduced_model_of(
         progress("reduced model: operators")
         full = in_solving_order(build_mesh_model(machine))
         del machine
-        keep_operators(full, digest)
+        kept = beside(partial(keep_operators, full, digest))
+    else:
+        kept = None
     near = _nearest(digest, full)
     built = build_reduced_model(spec, full, chosen, near=near, progress=progress)
+    if kept is not None:
+        kept()
     built.model.save(reduced_path(digest))
     if near is None or built.fields is not near.fields:
         KeptBasis(full.mesh_digest, built.fields).save(digest)
@@ -310,11 +316,17 @@ def build_reduced_model(
             basis = grown.leading(chosen.largest + 30 * attempt, chosen.tolerance)
         else:
             basis = np.eye(grown.size)
+        changed = near is None or len(basis) > near.model.size
+        fields = grown.fields(basis) if changed else near.fields
+        # Most checks confirm: the model is made beside them.
+        made = beside(partial(_projected, full, fields)) if changed else None
         progress("reduced model: check")
         share = CHECK_TOLERANCE if near is None else CHECK_OF_NEAR
         worst = {"probes": 0.0, "places": 0.0}
         # Solutions that have joined can no longer judge: every round draws others.
-        for sample in sampler.random_samples(chosen.checks, seed, 0.9 * chosen.sigmas):
+        samples = sampler.random_samples(chosen.checks, seed, 0.9 * chosen.sigmas)
+        grown.expect(samples, SHIFTS)
+        for sample in samples:
             loads = physical_loads(full, sample, spec)
             missing = np.hstack(grown.missing(sample, loads, SHIFTS, basis, share))
             errors = {"probes": _largest(full.probes @ missing), "places": _largest(full.places @ missing)}
@@ -326,12 +338,8 @@ def build_reduced_model(
         seed += 100
         if worst["probes"] <= chosen.error:
             own = {"digest": reduced_digest(spec, chosen.key(spec)), "ranges": sampler.ranges()}
-            if near is not None and len(basis) == near.model.size:
-                return Reduction(replace(near.model, errors=worst, **own), near.fields)
-            fields = grown.fields(basis)
-            one = np.eye(1, basis.shape[1])[0]
-            # The matrices of the mesh in double precision: what was worked out on the way is right to 1e-6.
-            return Reduction(replace(project(full, fields.astype(float), one), errors=worst, **own), fields)
+            model = near.model if made is None else made()
+            return Reduction(replace(model, errors=worst, **own), fields)
     raise ConvergenceError(
         "reduced model",
         f"its probes still err by {worst['probes']:.3g} K with {basis.shape[1]} basis vectors.",
@@ -339,18 +347,30 @@ def build_reduced_model(
     )
 
 
+def _projected(full: MeshModel, fields: NDArray[np.float32]) -> ThermalModel:
+    """Projection by matrices in double precision: what was worked out on the way is right to 1e-6."""
+    return project(full, fields.astype(float), np.eye(1, fields.shape[1])[0])
+
+
 def _wanted(grown: GrowingProjection, nominal: Sample, spec: MachineSpec) -> float:
     """Error in the energy norm of a solution from which a basis is made."""
     return SOLUTION_ERROR * grown.size_of(nominal, physical_loads(grown.full, nominal, spec))
 
 
+def _snapshot_samples(sampler: _Sampler) -> list[Sample]:
+    """Coefficients beside the nominal ones: each group of joints opened, and draws over the range."""
+    joints = [{f"joint.{group.name}": OPENED} for group in sampler.spec.joint]
+    opened = [sampler.sample(factors, sampler.usual_speed) for factors in joints]
+    return [*opened, *sampler.random_samples(sampler.options.samples, 1, sampler.options.sigmas)]
+
+
 def _add_snapshots(grown: GrowingProjection, sampler: _Sampler, nominal: Sample, wanted: float) -> None:
     """Sources one by one at the nominal coefficients, then physical loads over the range."""
-    spec, chosen = sampler.spec, sampler.options
-    _add_nominal(grown, nominal, spec, wanted)
-    opened = [sampler.sample({f"joint.{group.name}": OPENED}, sampler.usual_speed) for group in spec.joint]
-    for sample in (*opened, *sampler.random_samples(chosen.samples, 1, chosen.sigmas)):
-        grown.enrich(sample, physical_loads(grown.full, sample, spec), SHIFTS, wanted)
+    others = _snapshot_samples(sampler)
+    grown.expect([nominal, *others], SHIFTS)
+    _add_nominal(grown, nominal, sampler.spec, wanted)
+    for sample in others:
+        grown.enrich(sample, physical_loads(grown.full, sample, sampler.spec), SHIFTS, wanted)
 
 
 def _source_places(full: MeshModel, spec: MachineSpec) -> list[str]:
@@ -382,8 +402,8 @@ def _add_nominal(grown: GrowingProjection, nominal: Sample, spec: MachineSpec, w
     )
     for shift in SHIFTS:
         grown.enrich(nominal, loads, [shift], wanted)
-    grown.enrich(nominal, heat, [FAST_SHIFT], wanted)
     _add_contacts(grown, nominal, spec, wanted)
+    grown.enrich(nominal, heat, [FAST_SHIFT], wanted)
 
 
 def _add_contacts(grown: GrowingProjection, nominal: Sample, spec: MachineSpec, wanted: float) -> None:
@@ -393,23 +413,23 @@ def _add_contacts(grown: GrowingProjection, nominal: Sample, spec: MachineSpec, 
     one seat that is worse than the others. ``K⁻¹ g J u``, and the same of that, are the first terms of
     the series in a share of one conductance g with the operator J.
     """
-    full = grown.full
-    contacts = [
-        nominal.coefficients[name] * operator
-        for name, operator in zip(full.coefficient_names, full.operators, strict=True)
-        if name.startswith("joint.")
-    ]
-    loads = physical_loads(full, nominal, spec)
+    names = [name for name in grown.full.coefficient_names if name.startswith("joint.")]
+    loads = physical_loads(grown.full, nominal, spec)
     for shift in SHIFTS:
         [solved] = grown.enrich(nominal, loads, [shift], wanted).coordinates
         fields = grown.fields(solved)
         # All loads press heat through a contact almost alike: the largest combination represents them.
-        columns = [_largest_combination(contact @ fields) for contact in contacts]
+        flows = [
+            (rows, _largest_combination(flow)) for rows, flow in grown.flows(names, [fields] * len(names))
+        ]
         for order in range(CONTACT_ORDERS):
-            [solved] = grown.enrich(nominal, np.column_stack(columns), [shift], wanted).coordinates
+            columns = np.zeros((len(fields), len(names)), dtype=np.float32)
+            for column, name, (rows, flow) in zip(columns.T, names, flows, strict=True):
+                column[rows] = nominal.coefficients[name] * flow
+            [solved] = grown.enrich(nominal, columns, [shift], wanted).coordinates
             if order + 1 < CONTACT_ORDERS:
                 changes = grown.fields(solved)
-                columns = [contact @ change for contact, change in zip(contacts, changes.T, strict=True)]
+                flows = grown.flows(names, changes.T)
 
 
 def _largest_combination(columns: Array) -> Array:

@@ -26,7 +26,7 @@ from spindle_fem.model.mesh.threads import LEAST_ROWS, inner_product, product, r
 from spindle_fem.model.reduced.mesh_model import MeshModel
 from spindle_fem.model.reduced.snapshots import Sample
 from spindle_fem.model.thermal_model import MATRIX_FIELDS, ThermalModel
-from spindle_fem.parallel import in_threads
+from spindle_fem.parallel import beside, in_threads
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,8 @@ LEAST_REDUCTION = 0.5
 ROWS_AT_ONCE = 16_384
 # Share of the largest square below which the new part of a block may be round-off.
 DEPENDENT_SHARE = 1.0e-9
-FIRST_ROOM = 256
+# Directions that there is room for at first, and the share by which it grows.
+FIRST_ROOM, GROWTH = 320, 1.25
 # A preconditioner is made for this share of the highest frequency, which is at least this [1/s]: slow
 # fields, in which other frequencies differ, are held by the directions.
 FAR, SLOW = 10.0, 3.0e-3
@@ -58,7 +59,7 @@ class _Block:
     def projected(self, directions: NDArray[np.float32], fresh: NDArray[np.float32]) -> Array:
         """``Dᵀ K Q`` of directions (n, d) and some of them (n, q), (d, q)."""
         own = np.ascontiguousarray(fresh[self.rows])
-        image = np.empty_like(own)
+        image = room(own.shape, own.dtype)
         product_of(self.matrix)(own, image)
         return inner_product(directions[self.rows], image)
 
@@ -128,6 +129,8 @@ class GrowingProjection:
     _blocks: dict[str, list[_Block]] = field(init=False, default_factory=dict)
     _solved: list[Array] = field(init=False, default_factory=list)
     _last: _System | None = field(init=False, default=None)
+    _coming: list[tuple[Sample, float]] = field(init=False, default_factory=list)
+    _begun: Callable[[], _System] | None = field(init=False, default=None)
 
     def __post_init__(self, known: tuple[NDArray[np.float32], ThermalModel] | None) -> None:
         full = self.full
@@ -150,13 +153,23 @@ class GrowingProjection:
         """Temperatures of coordinates (d', m) on the first d' directions, (n, m) [K]."""
         return product(self._directions[:, : len(coordinates)], coordinates.astype(PRECISION))
 
+    def flows(
+        self, coefficients: Sequence[str], fields: Sequence[NDArray]
+    ) -> list[tuple[slice | NDArray[np.int64], NDArray]]:
+        """What unit coefficients conduct in fields (n,) or (n, m) of each: rows, and ``K_i T`` on these."""
+        self._prepare_to_grow()
+        own = [self._blocks["operators"][self.full.coefficient_names.index(name)] for name in coefficients]
+        return [(item.rows, item.matrix @ field[item.rows]) for item, field in zip(own, fields, strict=True)]
+
     def _prepare_to_grow(self) -> None:
         """Matrix of the energy, and every operator on its own rows: a basis that is enough needs neither."""
         if self._energy is None:
             full = self.full
             energy = full.conduction(self.sample.coefficients, self.sample.channel_film)
             self._energy = _single(sum_of(energy, full.capacity(self.sample.capacities), CAPACITY_SHARE))
-            self._blocks = {name: [_block(item) for item in getattr(full, name)] for name in MATRIX_FIELDS}
+            for name in MATRIX_FIELDS:
+                own = getattr(full, name)
+                self._blocks[name] = in_threads([partial(_block, own, index) for index in range(len(own))])
 
     def add(self, block: NDArray[np.float32], smallest: float = 0.0) -> Array:
         """Let fields (n, m) join; returns their coordinates (d, m) on all directions.
@@ -167,7 +180,7 @@ class GrowingProjection:
             Of what is new in a direction, in the energy norm; what is smaller is left out.
         """
         self._prepare_to_grow()
-        image = np.empty_like(block)
+        image = room(block.shape, block.dtype)
         product_of(self._energy)(block, image)
         known = inner_product(self.directions, image)
         held = np.linalg.solve(self._weighted(self.sample, CAPACITY_SHARE), known)
@@ -206,7 +219,7 @@ class GrowingProjection:
 
     def _make_room(self, size: int) -> None:
         if size > self._directions.shape[1]:
-            wider = room((self.full.size, 2 * size), PRECISION)
+            wider = room((self.full.size, int(GROWTH * size)), PRECISION)
             wider[:, : self.size] = self.directions
             self._directions = wider
 
@@ -249,7 +262,7 @@ class GrowingProjection:
             target = np.minimum(wanted**2, LEAST_REDUCTION**2 * values[chosen])
             missing.append(_Missing(product(residual, turn), product(conditioned, turn), target))
         if any(turn.size for turn in turns):
-            added = self.add(np.hstack(self._corrected(system, missing, shifts)), DISTINCT_SHARE * wanted)
+            added = self.add(_together(self._corrected(system, missing, shifts)), DISTINCT_SHARE * wanted)
             parts = np.split(added, np.cumsum([turn.shape[1] for turn in turns])[:-1], axis=1)
             for index, (turn, part) in enumerate(zip(turns, parts, strict=True)):
                 found = part @ turn.T
@@ -278,17 +291,27 @@ class GrowingProjection:
             missing.append(_Missing(residual, conditioned, target))
         return self._corrected(system, missing, shifts)
 
+    def expect(self, samples: Sequence[Sample], shifts: Sequence[float]) -> None:
+        """Say which samples come next, in their order: each is prepared while the one before is solved."""
+        self._coming += [(sample, _slow_share(shifts)) for sample in samples]
+
     def _system(self, sample: Sample, shifts: Sequence[float]) -> _System:
-        last, full = self._last, self.full
+        shift = _slow_share(shifts)
+        if self._coming and self._coming[0][0] is sample and self._coming[0][1] == shift:
+            self._coming.pop(0)
+            self._last = self._begun() if self._begun else self._prepared(sample, shift, None)
+            self._begun = beside(partial(self._prepared, *self._coming[0], None)) if self._coming else None
+        elif self._last is None or self._last.sample is not sample or self._last.shift != shift:
+            self._last = self._prepared(sample, shift, self._last)
+        return self._last
+
+    def _prepared(self, sample: Sample, shift: float, last: _System | None) -> _System:
+        full = self.full
         if last is None or last.sample is not sample:
             conduction = full.conduction(sample.coefficients, sample.channel_film)
             last = _System(sample, _single(conduction), _single(full.capacity(sample.capacities)))
-        shift = max(*shifts, SLOW) / FAR
-        if last.shift != shift:
-            matrix = sum_of(last.conduction, last.capacity, shift)
-            last = replace(last, shift=shift, preconditioner=build_preconditioner(full.system(matrix)))
-        self._last = last
-        return last
+        matrix = sum_of(last.conduction, last.capacity, shift)
+        return replace(last, shift=shift, preconditioner=build_preconditioner(full.system(matrix)))
 
     def _projected(
         self, system: _System, loads: Array, shifts: Sequence[float], basis: Array | None = None
@@ -307,7 +330,7 @@ class GrowingProjection:
             coordinates = np.linalg.solve(conduction + shift * capacity, entering)
             coordinates = coordinates if basis is None else basis @ coordinates
             known = np.ascontiguousarray(self.fields(coordinates))
-            image = np.empty_like(known)
+            image = room(known.shape, known.dtype)
             system.product(known, image, np.full(known.shape[1], shift))
             solved.append(coordinates)
             residuals.append(np.subtract(loads, image, dtype=PRECISION, casting="same_kind"))
@@ -320,10 +343,10 @@ class GrowingProjection:
         counts = [item.residual.shape[1] for item in missing]
         own_shifts = np.repeat(shifts, counts)
         residual, direction = (
-            np.hstack([getattr(item, name) for item in missing]) for name in ("residual", "conditioned")
+            _together([getattr(item, name) for item in missing]) for name in ("residual", "conditioned")
         )
         target = np.concatenate([item.target for item in missing])
-        found = np.empty_like(residual)
+        found = room(residual.shape, residual.dtype)
         for first in range(0, len(target), COLUMNS_AT_ONCE):
             own = slice(first, first + COLUMNS_AT_ONCE)
             found[:, own] = corrections(
@@ -363,7 +386,13 @@ class GrowingProjection:
         return basis
 
 
-def _block(matrix: sparse.csr_array) -> _Block:
+def _slow_share(shifts: Sequence[float]) -> float:
+    """Frequency that the preconditioner of some [1/s] is made for."""
+    return max(*shifts, SLOW) / FAR
+
+
+def _block(matrices: Sequence[sparse.csr_array], index: int) -> _Block:
+    matrix = matrices[index]
     rows = np.flatnonzero(np.diff(matrix.indptr))
     if len(rows) and rows[-1] - rows[0] + 1 == len(rows):
         own = slice(int(rows[0]), int(rows[-1]) + 1)
@@ -377,9 +406,16 @@ def _single(matrix: sparse.csr_array) -> sparse.csr_array:
     )
 
 
+def _together(blocks: Sequence[NDArray]) -> NDArray:
+    """Blocks of columns side by side; one alone as it is."""
+    return np.hstack(blocks) if len(blocks) > 1 else np.ascontiguousarray(blocks[0])
+
+
 def _in_portions(apply: Callable[[NDArray], NDArray], columns: NDArray) -> NDArray:
     """A preconditioner on many columns, as many at once as are fast."""
-    found = np.empty_like(columns)
+    if columns.shape[1] <= COLUMNS_AT_ONCE:
+        return apply(np.ascontiguousarray(columns))
+    found = room(columns.shape, columns.dtype)
     for first in range(0, columns.shape[1], COLUMNS_AT_ONCE):
         own = slice(first, first + COLUMNS_AT_ONCE)
         found[:, own] = apply(np.ascontiguousarray(columns[:, own]))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +17,16 @@ from scipy import sparse
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import SpecError
-from spindle_fem.model.elastic.machine_bodies import carries_rings
-from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.model.mesh.equations import ThermalSystem
 from spindle_fem.model.mesh.evaluate import probe_matrix
+from spindle_fem.model.reduced.growth_rows import GrowthWorker, widened
 from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.coefficient_table import gap_radii_of
 from spindle_fem.operation.machine_loads import FieldState
-from spindle_fem.operation.named_places import growth_places, named_places
+from spindle_fem.operation.named_places import named_places
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.operation.probe_places import probe_positions, probe_slopes
+from spindle_fem.parallel import BackgroundProcess
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 
 Array = NDArray[np.float64]
@@ -64,10 +65,6 @@ class MeshModel(ThermalModel):
         )
 
 
-# Readings of displacement sensors are in micrometres, as large in number as those in kelvins.
-MICROMETRES = 1.0e6
-
-
 def build_mesh_model(machine: PreparedMachine) -> MeshModel:
     """Split a prepared machine into its unit operators.
 
@@ -88,28 +85,27 @@ def build_mesh_model(machine: PreparedMachine) -> MeshModel:
     lumped = _lumped_nodes(machine)
     size = operators.n_unknowns + len(lumped)
     names = tuple(name for name, _ in lumped)
-    coefficients = _conduction(machine, lumped, size)
-    films = tuple(f"film.{surface}" for film in spec.film for surface in film.surface)
-    storage = _storage(machine, names, size)
-    places = dict(named_places(machine, names, size))
-    points = [probe for probe in spec.probe if probe.kind == "point"]
-    rows = _widened(probe_matrix(operators, probe_positions(points), [p.part for p in points]), size)
-    gradients = _widened(probe_slopes(operators, points), size)
+    with BackgroundProcess(partial(GrowthWorker, machine), beside=machine.growth is None) as growth:
+        grown = growth.ask("rows", size)
+        coefficients = _conduction(machine, lumped, size)
+        films = tuple(f"film.{surface}" for film in spec.film for surface in film.surface)
+        storage = _storage(machine, names, size)
+        places = dict(named_places(machine, names, size))
+        points = [probe for probe in spec.probe if probe.kind == "point"]
+        rows = widened(probe_matrix(operators, probe_positions(points), [p.part for p in points]), size)
+        gradients = widened(probe_slopes(operators, points), size)
+        channel = {} if machine.builder.cells is None else _channel(machine, size)
+        found = grown()
     sensors = [sensor.name for sensor in spec.displacement_sensor]
     growing: dict[str, object] = {}
-    if sensors or (carries_rings(spec) and any(group.fit for group in spec.bearing_set)):
-        growth = machine.growth or GrowthModel(spec, operators.mesh, operators.order)
+    if found is not None:
         if sensors:
-            seen, spins = growth.sensor_rows
-            rows = sparse.vstack([rows, _micrometres(seen, size)], format="csr")
+            rows = sparse.vstack([rows, found.sensors], format="csr")
             gradients = sparse.vstack([gradients, sparse.csr_array((2 * len(sensors), size))], format="csr")
-            growing["probe_spins"] = MICROMETRES * np.append(np.zeros(len(points)), spins)
-        places |= growth_places(growth, size)
-        if growth.bearings:
-            own = [growth.bearings.index(bearing.name) for _, bearing in spec.bearings]
-            shifts = growth.thermal_rows[own].reshape(4 * len(own), -1)
-            growing["ring_shifts"] = _micrometres(shifts, size)
-    channel = {} if machine.builder.cells is None else _channel(machine, size)
+            growing["probe_spins"] = np.append(np.zeros(len(points)), found.spins)
+        places |= found.places
+        if found.shifts.shape[0]:
+            growing["ring_shifts"] = found.shifts
     return MeshModel(
         coefficient_names=tuple(coefficients),
         operators=tuple(coefficients.values()),
@@ -172,16 +168,6 @@ def _padded(matrix: sparse.csr_array, size: int) -> sparse.csr_array:
     padded = sparse.coo_array((entries.data, (entries.row, entries.col)), shape=(size, size)).tocsr()
     padded.eliminate_zeros()
     return padded
-
-
-def _widened(rows: sparse.csr_array, size: int) -> sparse.csr_array:
-    """Rows over the mesh's unknowns extended over the lumped nodes."""
-    return sparse.csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], size))
-
-
-def _micrometres(rows: Array, size: int) -> sparse.csr_array:
-    """Displacements [m/K] by temperatures of the mesh as µm/K over all unknowns."""
-    return _widened(sparse.csr_array(MICROMETRES * rows), size)
 
 
 def _lumped_nodes(machine: PreparedMachine) -> list[tuple[str, dict[str, Pieces]]]:

@@ -27,7 +27,7 @@ def _sums_of(count: int) -> Callable:
 
     @intrinsic
     def subtract(typing, sums, first, begin, end, columns, values, vectors):
-        """``sums[first + c] −= Σ values[p] vectors[columns[p], first + c]`` for p from begin to before end."""
+        """``sums[first + c] −= Σ values[p] vectors[columns[p], first + c]``, p from begin to end."""
         arrays = (sums, columns, values, vectors)
         if any(not isinstance(item, types.Array) or item.layout != "C" for item in arrays):
             return None
