@@ -316,10 +316,6 @@ def build_reduced_model(
             basis = grown.leading(chosen.largest + 30 * attempt, chosen.tolerance)
         else:
             basis = np.eye(grown.size)
-        changed = near is None or len(basis) > near.model.size
-        fields = grown.fields(basis) if changed else near.fields
-        # Most checks confirm: the model is made beside them.
-        made = beside(partial(_projected, full, fields)) if changed else None
         progress("reduced model: check")
         share = CHECK_TOLERANCE if near is None else CHECK_OF_NEAR
         worst = {"probes": 0.0, "places": 0.0}
@@ -338,18 +334,17 @@ def build_reduced_model(
         seed += 100
         if worst["probes"] <= chosen.error:
             own = {"digest": reduced_digest(spec, chosen.key(spec)), "ranges": sampler.ranges()}
-            model = near.model if made is None else made()
-            return Reduction(replace(model, errors=worst, **own), fields)
+            if near is not None and len(basis) == near.model.size:
+                return Reduction(replace(near.model, errors=worst, **own), near.fields)
+            fields = grown.fields(basis)
+            one = np.eye(1, basis.shape[1])[0]
+            # The matrices of the mesh in double precision: what was worked out on the way is right to 1e-6.
+            return Reduction(replace(project(full, fields.astype(float), one), errors=worst, **own), fields)
     raise ConvergenceError(
         "reduced model",
         f"its probes still err by {worst['probes']:.3g} K with {basis.shape[1]} basis vectors.",
         f"Asked: {chosen.error:g} K. Allow more basis vectors or a larger error.",
     )
-
-
-def _projected(full: MeshModel, fields: NDArray[np.float32]) -> ThermalModel:
-    """Projection by matrices in double precision: what was worked out on the way is right to 1e-6."""
-    return project(full, fields.astype(float), np.eye(1, fields.shape[1])[0])
 
 
 def _wanted(grown: GrowingProjection, nominal: Sample, spec: MachineSpec) -> float:

@@ -299,9 +299,9 @@ class GrowingProjection:
         shift = _slow_share(shifts)
         if self._coming and self._coming[0][0] is sample and self._coming[0][1] == shift:
             self._coming.pop(0)
-            self._last = self._begun() if self._begun else self._prepared(sample, shift, None)
+            self._last = self._begun() if self._begun else self._prepared(sample, shift, self._last)
             self._begun = beside(partial(self._prepared, *self._coming[0], None)) if self._coming else None
-        elif self._last is None or self._last.sample is not sample or self._last.shift != shift:
+        else:
             self._last = self._prepared(sample, shift, self._last)
         return self._last
 
@@ -310,6 +310,8 @@ class GrowingProjection:
         if last is None or last.sample is not sample:
             conduction = full.conduction(sample.coefficients, sample.channel_film)
             last = _System(sample, _single(conduction), _single(full.capacity(sample.capacities)))
+        if last.shift == shift:
+            return last
         matrix = sum_of(last.conduction, last.capacity, shift)
         return replace(last, shift=shift, preconditioner=build_preconditioner(full.system(matrix)))
 
