@@ -36,6 +36,7 @@ from tests.published.test_measured_friction import (
     JETS,
     RUN_DOWNS,
     bath_heat,
+    bath_over_minimum_oil,
     inlet,
     inlet_forces,
     jet_heat,
@@ -160,6 +161,10 @@ def measured_rows() -> list[Row]:
             (case, "Palmgren f_0 6.6, W", measured, heat["palmgren"]),
             (case, "full with Parker's share, W", measured, heat["full"]),
         ]
+    found += [
+        (f"{kind} bearing, 40 mm bore", "friction, oil bath over minimum oil", 2.0, ratio)
+        for kind, ratio in bath_over_minimum_oil().items()
+    ]
     for size, load in RUN_DOWNS:
         for rpm in (60, 210):
             case = f"ball of {size:g} mm, {load:g} N, races at {rpm} rpm"
