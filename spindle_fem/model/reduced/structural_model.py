@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ from spindle_fem.model.reduced.unit_loads import coolant_loads, fluid_loads
 from spindle_fem.model.thermal_model import ThermalModel, project
 from spindle_fem.operation.coefficient_table import build_coefficient_table
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.parallel import in_copies, in_threads, thread_count
 from spindle_fem.solvers.prepared_machine import PreparedMachine, prepare_machine
 
 Array = NDArray[np.float64]
@@ -214,7 +216,9 @@ def build_structural_model(
     full = full_machine(machine)
     if directions is None:
         directions = structural_directions(machine.spec, machine.mesh)
-    differences = [item.cause.difference(full, item.sigma) for item in directions]
+    differences = in_copies(
+        [partial(item.cause.difference, full, item.sigma) for item in directions], thread_count()
+    )
     progress("structural directions: fields")
     basis, energy = _basis(full.model, machine, differences, [item.sigma for item in directions])
     model = project(full.model, basis, basis.T @ (energy @ full.model.one))
@@ -260,19 +264,35 @@ def _basis(
                 coolant_loads(full, sample.channel_film, 3),
             )
         )
-        conduction = full.conduction(sample.coefficients, sample.channel_film)
-        for shift in shifts:
-            matrix = conduction + shift * full.capacity(sample.capacities)
-            factor = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-            fields = factor.solve(loads)
-            space.add(fields)
-            if sample is usual:
-                added = [
-                    sigma * _largest(_added_loads(full, item, sample, shift, fields), FIELDS_EACH)
-                    for item, sigma in zip(differences, sigmas, strict=True)
-                ]
-                space.add(factor.solve(np.hstack(added)))
+        given = differences if sample is usual else ()
+        jobs = [partial(_fields, full, sample, loads, shift, given, sigmas) for shift in shifts]
+        for found in in_threads(jobs):
+            for fields in found:
+                space.add(fields)
     return space.basis(LARGEST), energy
+
+
+def _fields(
+    full: MeshModel,
+    sample: Sample,
+    loads: Array,
+    shift: float,
+    differences: Sequence[Difference],
+    sigmas: Sequence[float],
+) -> list[Array]:
+    """Fields (n, m) K of loads at a Laplace frequency, then those that differences, if any, add to them."""
+    matrix = full.conduction(sample.coefficients, sample.channel_film) + shift * full.capacity(
+        sample.capacities
+    )
+    factor = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    found = [factor.solve(loads)]
+    if differences:
+        added = [
+            sigma * _largest(_added_loads(full, item, sample, shift, found[0]), FIELDS_EACH)
+            for item, sigma in zip(differences, sigmas, strict=True)
+        ]
+        found.append(factor.solve(np.hstack(added)))
+    return found
 
 
 def _added_loads(
