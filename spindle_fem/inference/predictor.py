@@ -106,6 +106,7 @@ class Predictor:
             for recording, gaps in zip(self.recordings, self._gaps, strict=True)
         ]
         self._unread: dict[tuple[str, int], Array] = {}
+        self._last: dict[int, TransientRun] = {}  # its matrices serve the next run where nothing moved them
         self._about: tuple[Mapping[str, float], Sequence[Candidate]] = ({}, ())
         self.misdescribed: tuple[Misdescription, ...] = ()
         self.unseen: tuple[Array, ...] = ()
@@ -325,17 +326,17 @@ class Predictor:
         like : TransientRun, optional
             Another run of this recording; what both have in common is taken from it.
         """
-        parameters, terms = self._physics(number, values, candidates)
-        drive = self.drives[number]
-        return TransientRun(
+        drive, (parameters, terms) = self.drives[number], self._physics(number, values, candidates)
+        run = self._last[number] = TransientRun(
             self.fast,
             drive,
             parameters,
             tuple(derivatives),
             (*self.fast.own_terms(drive), *terms),
-            like=like,
+            like=self._last.get(number) if like is None else like,
             same_within=self.same_within,
         )
+        return run
 
     def predict(
         self,
