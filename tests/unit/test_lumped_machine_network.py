@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -59,7 +61,7 @@ def test_more_bearings_make_more_columns():
     assert network.n_nodes % len(network.partition.columns) == 0
 
 
-def test_spans_that_are_cooled_are_divided_about_where_that_begins_and_ends():
+def test_spans_are_divided_about_bearings_and_where_cooling_begins_and_ends():
     spec = load_machine("motor_spindle")
     columns = build_machine_network(spec).partition.columns
     edges = np.array([columns[0].z[0], *(column.z[1] for column in columns)])
@@ -68,10 +70,33 @@ def test_spans_that_are_cooled_are_divided_about_where_that_begins_and_ends():
         assert edges[at] == pytest.approx(end, abs=1e-12)
         # at most one and a half bearings wide on either side, half of one at least
         assert all(0.5 * 0.018 <= width <= 1.5 * 0.018 for width in np.diff(edges)[at - 1 : at + 1])
-    assert len({column.name for column in columns}) == len(columns) == 17
+    assert len({column.name for column in columns}) == len(columns) == 21
     assert [column.bearing for column in columns if column.bearing] == ["F1", "F2", "R1", "R2"]
-    # Nothing cools the spans of a machine without coolant.
-    assert len(build_machine_network(load_machine("uncooled")).partition.columns) <= 9
+    # Heat leaves a bearing in spans that nothing cools, too.
+    for name in ("uncooled", "motor_spindle"):
+        spec = load_machine(name)
+        columns = build_machine_network(spec).partition.columns
+        widest = 1.5 * max(bearing.z[1] - bearing.z[0] for _, bearing in spec.bearings)
+        beside = [
+            one if one.bearing is None else other
+            for one, other in pairwise(columns)
+            if (one.bearing is None) != (other.bearing is None)
+        ]
+        assert all(column.z[1] - column.z[0] <= widest for column in beside)
+    assert len(build_machine_network(load_machine("wu_tan_2016")).partition.columns) == 9
+
+
+@pytest.mark.parametrize("machine", ["belt_lathe", "uncooled", "motor_spindle"])
+def test_rings_are_as_warm_as_of_a_fine_network(machine):
+    """Rings up to 4.8 K off with one column for each span that nothing cools, and lands that end at none."""
+    spec = load_machine(machine, ["heat.thermal_preload=false"])
+    coarse, fine = (
+        solve_machine_network(build_machine_network(spec, refinement=number)).bearing_temperatures()
+        for number in (1, 6)
+    )
+    for name, item in coarse.items():
+        assert item.inner == pytest.approx(fine[name].inner, abs=1.8)
+        assert item.outer == pytest.approx(fine[name].outer, abs=2.3)
 
 
 def test_rings_beside_a_channel_are_as_warm_as_of_a_fine_network():

@@ -281,8 +281,9 @@ def _assemble(assembly, channel, z_lines, r_lines, owner, void, smeared, channel
     radial, area = faces["radial"], faces["area"]
     same = (part_a == part_b) & (part_a != OUTSIDE)
     free = 1.0 - np.maximum(void_a, void_b)
-    # the lands of a smeared channel conduct along r; along z every one ends at the coolant
-    free = np.where(~radial & (smear_a | smear_b), 0.0, free)
+    # the lands of a smeared channel conduct along r; along z every one ends at the coolant, but the first and
+    # the last conduct what the body beside them brings
+    free = np.where(~radial & smear_a & smear_b, 0.0, free)
 
     def select(mask: NDArray, share: Array, first: NDArray, second: NDArray, names: NDArray) -> Faces:
         return Faces(

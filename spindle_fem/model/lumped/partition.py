@@ -3,8 +3,8 @@
 Columns follow the bearings: one for each bearing, one for each spacer or span
 between bearings that is at least half a bearing wide (narrower ones go half
 and half to their neighbours), one before the first and one after the last
-bearing. Spans that a channel or a circuit cools are divided where it begins
-and ends and finely about there; the paper's machine keeps the paper's columns.
+bearing. Spans are divided where a channel or a circuit begins and ends, and
+finely about there and beside bearings; the paper's machine keeps the paper's columns.
 In a column, nodes follow the parts from the shaft outwards; the thickest
 bodies are divided until every column has as many nodes as the richest,
 which for a bearing inside a cooled housing is eight.
@@ -25,7 +25,7 @@ from spindle_fem.model.lumped.cells import MeridianCells, channel_zone
 
 NARROW_SPAN = 0.5
 SNAP = 0.35
-# Each piece of a span over the one before it, going away from where cooling begins or ends.
+# Each piece of a span over the one before it, going away from a bearing or an end of cooling.
 GROWTH = 2.0
 SHAFT, INNER, OUTER, HOUSING = "shaft", "inner", "outer", "housing"
 
@@ -106,19 +106,18 @@ def _cooled_zones(spec: MachineSpec) -> list[tuple[float, float]]:
 
 
 def _divided(column: Column, zones: Iterable[tuple[float, float]], first: float) -> Iterator[Column]:
-    """A span that is cooled on some of its length, cut where that begins and ends, and finely about there.
+    """A span cut where cooling begins and ends, and finely about there and at its own ends.
 
     Parameters
     ----------
     first : float, [m]
         Width of the pieces beside a cut.
     """
-    inside = [zone for zone in zones if _overlaps(column.z, zone)]
-    if column.bearing is not None or not inside:
+    if column.bearing is not None:
         yield column
         return
     edges = list(column.z)
-    for end in (end for zone in inside for end in zone):
+    for end in (end for zone in zones for end in zone):
         if edges[0] < end < edges[-1] and min(abs(end - edge) for edge in edges) >= NARROW_SPAN * first:
             edges = sorted([*edges, end])
     borders = [edge for ends in pairwise(edges) for edge in _graded(*ends, first)[:-1]] + [edges[-1]]
@@ -129,7 +128,7 @@ def _divided(column: Column, zones: Iterable[tuple[float, float]], first: float)
 def _graded(low: float, high: float, first: float) -> list[float]:
     """Borders of pieces of about ``first`` at both ends, further ones up to twice as wide as those before.
 
-    Heat that a coolant takes leaves within some wall thicknesses from where the cooling begins.
+    Heat of a bearing, and what a coolant takes, leaves within some wall thicknesses from there.
 
     >>> _graded(0.0, 12.0, 2.0)
     [0.0, 2.0, 6.0, 10.0, 12.0]
