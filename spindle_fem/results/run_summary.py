@@ -202,16 +202,18 @@ def _growth(result: ThermalResult, growth: Growth) -> dict[str, Any]:
         }
     seats = {key: state.seat_growth for key, state in growth.seats.items()}
     raceways = {key: state.raceway_growth for key, state in growth.seats.items()}
-    shape = _shape(growth, seats, raceways)
+    rings: dict[str, dict[str, float]] = {}
     for (bearing, side), motion in result.raceway_motions.items():
-        ring = RING_ON[side]
-        shape["raceways"][bearing] |= {
-            f"{ring}_axial_um": 1e6 * motion.axial,
-            f"{ring}_twist_urad": 1e6 * motion.twist,
-        }
+        rings.setdefault(bearing, {}).update(
+            {
+                f"{RING_ON[side]}_axial_um": 1e6 * motion.axial,
+                f"{RING_ON[side]}_twist_urad": 1e6 * motion.twist,
+            }
+        )
     return {
         "growth": {
-            **shape,
+            **_shape(growth, seats, raceways),
+            "rings": rings,
             "spacers": {name: {"length_um": 1e6 * value} for name, value in growth.spacers.items()},
             **({} if solid is None else {"three_dimensional": _solid_shape(solid)}),
         },

@@ -70,7 +70,7 @@ def solve_many(
         product(block, residual)
         np.subtract(loads[:, own], residual, out=residual)
         known = np.abs(dots(np.ascontiguousarray(loads[:, own]), block))
-        direction = preconditioner.apply(residual)
+        direction = np.ascontiguousarray(preconditioner.apply(residual))  # a factor's columns lie apart
         target = relative_tolerance**2 * (known + dots(residual, direction))
         solved[:, own] = block + corrections(
             lambda vectors, out, _: product(vectors, out),

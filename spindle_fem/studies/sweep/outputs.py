@@ -83,7 +83,7 @@ _OF_BEARINGS = (
 )
 COOLER_HEAT = "derived.cooler_heat_W"
 # How the nose bends aside, where a machine has two sets of bearings.
-_RACEWAY = ("_um", "_axial_um", "_twist_urad")
+_RING = ("_axial_um", "_twist_urad")
 _NOSE_ASIDE = ("radial_up_um", "radial_across_um", "tilt_up_urad", "tilt_across_urad")
 # Of each bearing and its set; only full solves have them.
 STIFFNESS = ".axial_stiffness_N_um"
@@ -141,7 +141,8 @@ def _paths(spec: MachineSpec) -> Iterator[str]:
                 yield from (f"growth.nose_{key}" for key in _NOSE_ASIDE)
         for name in names:
             for ring in ("inner", "outer"):
-                yield from (f"growth.raceways.{name}.{ring}{key}" for key in _RACEWAY)
+                yield f"growth.raceways.{name}.{ring}_um"
+                yield from (f"growth.rings.{name}.{ring}{key}" for key in _RING)
             yield from (f"growth.seats.{name}.{side}_um" for side in ("shaft", "housing"))
         spacers = (part.name for part in spec.part if Layout(spec, set()).is_spacer(part))
         yield from (f"growth.spacers.{name}.length_um" for name in spacers)
