@@ -8,7 +8,7 @@ the centrifugal load, with a pressure on any other face.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -58,22 +58,36 @@ class ElasticBody:
         Of every region of the section.
     harmonic : int
         0: stretched evenly round the axis; 1: bent, its sections shifted upwards.
+    twin : ElasticBody, optional
+        The same body at another place of the axis: what does not depend on the place is worked out there.
     """
 
     name: str
     section: MeridianMesh
     stiffnesses: Sequence[Stiffness]
     harmonic: int = 0
+    twin: ElasticBody | None = None
+
+    def __post_init__(self) -> None:
+        assert self.twin is None or self.twin.harmonic == self.harmonic
+
+    def moved(self, name: str, distance: float) -> ElasticBody:
+        """A twin of this body, further along the axis by a distance in m."""
+        return replace(self, name=name, section=self.section.moved(distance), twin=self)
 
     @cached_property
     def basis(self) -> Basis:
-        """Biquadratic displacements, two components or three."""
+        """Biquadratic displacements, two components or three; of a twin at the place of the first."""
+        if self.twin is not None:
+            return self.twin.basis
         element = ElementVector(ElementQuad2(), dim=3 if self.harmonic else 2)
         return Basis(self.section.mesh, element, intorder=QUADRATURE_DEGREE)
 
     @cached_property
     def coefficients(self) -> dict[str, Array]:
         """Elastic constants of every element, as the forms take them."""
+        if self.twin is not None:
+            return self.twin.coefficients
         region = self.section.region
         stack = {
             name: np.array([getattr(s, name) for s in self.stiffnesses])[region]
@@ -93,6 +107,8 @@ class ElasticBody:
 
     @cached_property
     def _factor(self) -> tuple[SuperLU, NDArray[np.int64]]:
+        if self.twin is not None:
+            return self.twin._factor
         matrix = self.stiffness_matrix()
         free = np.setdiff1d(np.arange(self.basis.N), self._held)
         return splu(matrix[free][:, free].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0), free
@@ -112,6 +128,8 @@ class ElasticBody:
     @cached_property
     def spin_load(self) -> Array:
         """Centrifugal load of 1 rad/s, to be multiplied by the speed squared, N s²."""
+        if self.twin is not None:
+            return self.twin.spin_load
         density = np.broadcast_to(self.coefficients["density"], self.basis.dx.shape)
         return forms.rotation.assemble(self.basis, density=density)
 
@@ -139,7 +157,7 @@ class ElasticBody:
         basis = self._on(face)
         z, r = basis.default_parameters()["x"]
         weight = basis.dx * r / float(np.sum(basis.dx * r))
-        return float(np.sum(weight * z)), float(np.sum(weight * r))
+        return float(np.sum(weight * z)) + self._beyond_twin, float(np.sum(weight * r))
 
     @cached_property
     def _faces(self) -> dict[Face, FacetBasis]:
@@ -147,9 +165,16 @@ class ElasticBody:
 
     def _on(self, face: Face) -> FacetBasis:
         """Sides of elements on the boundary that make up a face."""
+        if self.twin is not None:
+            return self.twin._on(Face(tuple(z - self._beyond_twin for z in face.z), face.r))
         if face not in self._faces:
             self._faces[face] = self._sides(face)
         return self._faces[face]
+
+    @property
+    def _beyond_twin(self) -> float:
+        """How much further along the axis than the twin it lies, m."""
+        return 0.0 if self.twin is None else float(self.section.z[0] - self.twin.section.z[0])
 
     def _sides(self, face: Face) -> FacetBasis:
         middle = self.section.mesh.p[:, self.section.mesh.facets].mean(axis=1)
@@ -174,6 +199,8 @@ class ElasticBody:
     @cached_property
     def expansion_load(self) -> sparse.csr_array:
         """Load (n_unknowns, n_corners) of a kelvin at each corner of the section's cells, N/K."""
+        if self.twin is not None:
+            return self.twin.expansion_load
         corners = Basis(self.section.mesh, ElementQuad1(), quadrature=self.basis.quadrature)
         thermal = np.broadcast_to(self.coefficients["thermal"], (3, *self.basis.dx.shape))
         return forms.expansion.assemble(corners, self.basis, harmonic=self.harmonic, thermal=thermal)

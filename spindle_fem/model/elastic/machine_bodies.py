@@ -109,11 +109,17 @@ def machine_bodies(spec: MachineSpec, *, size: float = ELEMENT_SIZE) -> MachineB
         carriers[rotating] = main.name
         parts[main.name] = tuple(part.name for part in own)
         bodies[main.name] = ElasticBody(main.name, section, stiffnesses)
+    known: dict[tuple, ElasticBody] = {}
     for seat in seats:
-        z, radii = seat.face.z, sorted((seat.face.r[0], seat.raceway.r[0]))
-        section = MeridianMesh.of([[AnnularSegment(*z, *radii)]], 0.5 * size)
+        z, radii = seat.face.z, tuple(sorted((seat.face.r[0], seat.raceway.r[0])))
         material = elastic_material(spec.part_material(seat.ring))
-        bodies[seat.ring] = ElasticBody(seat.ring, section, [material.stiffness])
+        shape = round(z[1] - z[0], 9), radii, material
+        if shape in known:
+            first = known[shape]
+            bodies[seat.ring] = first.moved(seat.ring, z[0] - float(first.section.z[0]))
+        else:
+            section = MeridianMesh.of([[AnnularSegment(*z, *radii)]], 0.5 * size)
+            bodies[seat.ring] = known[shape] = ElasticBody(seat.ring, section, [material.stiffness])
         parts[seat.ring] = (seat.ring,)
     return MachineBodies(bodies, parts, seats, carriers.get(True, ""), carriers.get(False, ""))
 

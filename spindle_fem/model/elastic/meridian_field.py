@@ -87,8 +87,16 @@ class MeridianField:
         places, weights = get_quadrature(RefTet, POINT_DEGREE)
         shape, slopes = evaluate_shape(tetrahedron_element(2), places)
         nodes = self.mesh.points[self._elements]
-        jacobian = np.einsum("enx,qnk->eqxk", nodes, slopes)
-        return (shape @ nodes).reshape(-1, 3), (np.linalg.det(jacobian) * weights).ravel(), places
+        # rows of the Jacobian, each (3, n_elements, n_points), and its determinant
+        by_coordinate = np.ascontiguousarray(np.moveaxis(nodes, 2, 0))
+        x, y, z = by_coordinate @ np.moveaxis(slopes, 1, 0).reshape(nodes.shape[1], -1)
+        x, y, z = (np.moveaxis(item.reshape(-1, len(weights), 3), 2, 0) for item in (x, y, z))
+        size = (
+            x[0] * (y[1] * z[2] - y[2] * z[1])
+            + x[1] * (y[2] * z[0] - y[0] * z[2])
+            + x[2] * (y[0] * z[1] - y[1] * z[0])
+        )
+        return (shape @ nodes).reshape(-1, 3), (size * weights).ravel(), places
 
     @cached_property
     def _elements(self) -> NDArray[np.int64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -75,6 +75,10 @@ class MeridianMesh:
         used, numbers = np.unique(node, return_inverse=True)
         points = np.array([z[used // len(r)], r[used % len(r)]])
         return cls(z, r, cell, of_cell[i, j], MeshQuad(points, numbers.reshape(node.shape)))
+
+    def moved(self, distance: float) -> MeridianMesh:
+        """The same section further along the axis, by a distance in m."""
+        return replace(self, z=self.z + distance, mesh=self.mesh.translated((distance, 0.0)))
 
     def locate(self, z: Array, r: Array) -> tuple[NDArray[np.int64], Array]:
         """Element of each point, the nearest of one outside, and its place (2, n) in the unit square."""

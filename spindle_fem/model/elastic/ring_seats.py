@@ -135,9 +135,12 @@ class RingSeats:
         ring_rows : (2k, 2, m) ndarray, [m/K]
             Shift of every ring's own seat face and raceway.
         """
-        size = seat_rows.shape[-1]
-        openings = self.inwards[:, None] * (seat_rows - ring_rows[:, 0])
-        return np.concatenate([openings.reshape(-1, 2, size), ring_rows[:, 1].reshape(-1, 2, size)], axis=1)
+        pairs = (len(self.rings) // 2, 2, seat_rows.shape[-1])
+        rows = np.empty((pairs[0], 4, pairs[2]))  # filled in place: they are large
+        np.subtract(seat_rows.reshape(pairs), ring_rows[:, 0].reshape(pairs), out=rows[:, :2])
+        rows[:, :2] *= self.inwards.reshape(-1, 2, 1)
+        rows[:, 2:] = ring_rows[:, 1].reshape(pairs)
+        return rows
 
     def rows_over(self, values: Mapping[str, Array | sparse.csr_array]) -> tuple[Array, Array]:
         """Seat and ring rows, as :meth:`thermal_rows` takes them, over m temperatures.
