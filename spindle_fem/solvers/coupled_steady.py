@@ -300,9 +300,8 @@ def _beyond_the_fold(
     """The error of a runaway, with the speed up to which the machine has an equilibrium.
 
     Just beyond a fold temperatures creep on without end: what did not converge there is a runaway too.
-    The error itself where equilibria go on. They are followed with films and contacts at ambient
-    temperature first, then with those of states solved just below the speed that was reached, until that
-    stays.
+    Equilibria are followed with films and contacts at ambient temperature first, then with those of
+    states solved just below the speed that was reached, until that stays; the error itself where they go on.
     """
     try:
         slow = replace(point, speed=SLOW_RUNNING * point.speed)

@@ -82,8 +82,9 @@ _OF_BEARINGS = (
     "derived.axial_gradient_K_per_m",
 )
 COOLER_HEAT = "derived.cooler_heat_W"
-# How the nose bends aside, where a machine has two sets of bearings.
+# How a ring moves and turns beside its raceway's growth.
 _RING = ("_axial_um", "_twist_urad")
+# How the nose bends aside, where a machine has two sets of bearings.
 _NOSE_ASIDE = ("radial_up_um", "radial_across_um", "tilt_up_urad", "tilt_across_urad")
 # Of each bearing and its set; only full solves have them.
 STIFFNESS = ".axial_stiffness_N_um"
