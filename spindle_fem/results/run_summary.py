@@ -60,11 +60,17 @@ def peak_memory_MB() -> float:  # noqa: N802 - the unit belongs to the name
 
 
 def build_summary(
-    result: ThermalResult, wall_time_s: float, peak_rss_MB: float, *, with_shape: bool = True
+    result: ThermalResult,
+    wall_time_s: float,
+    peak_rss_MB: float,
+    *,
+    with_shape: bool = True,
+    with_rings: bool = True,
 ) -> dict[str, Any]:
     """Dictionary written as ``summary.json``; ``nan`` becomes ``None``.
 
-    ``with_shape``: growth and displacements too, which take as long as a small machine's solve.
+    ``with_shape``: growth and displacements too, which take as long as a small machine's solve;
+    ``with_rings``: of growth also how rings move and turn, for which every body is deformed.
     """
     growth = result.growth if with_shape else None
     displacements = result.displacements if with_shape else {}
@@ -105,7 +111,7 @@ def build_summary(
                 "max_degC": result.temperature_maximum - ZERO_CELSIUS_K,
                 "max_at_mm": maximum_mm,
             },
-            **({} if growth is None else _growth(result, growth)),
+            **({} if growth is None else _growth(result, growth, with_rings)),
             "displacements": {name: 1e6 * value for name, value in displacements.items()},
             **({} if result.equilibrium is None else {"equilibrium": _equilibrium(result.equilibrium)}),
             "joints": {name: {"heat_W": value} for name, value in result.heat_flows.items()},
@@ -191,7 +197,7 @@ def _circuit(circuit: CircuitResult) -> dict[str, Any]:
     }
 
 
-def _growth(result: ThermalResult, growth: Growth) -> dict[str, Any]:
+def _growth(result: ThermalResult, growth: Growth, with_rings: bool) -> dict[str, Any]:
     """Blocks ``growth`` and ``fits``, lengths in µm."""
     solid = result.solid_growth
     fits: dict[str, dict[str, dict[str, float]]] = {}
@@ -203,7 +209,7 @@ def _growth(result: ThermalResult, growth: Growth) -> dict[str, Any]:
     seats = {key: state.seat_growth for key, state in growth.seats.items()}
     raceways = {key: state.raceway_growth for key, state in growth.seats.items()}
     rings: dict[str, dict[str, float]] = {}
-    for (bearing, side), motion in result.raceway_motions.items():
+    for (bearing, side), motion in result.raceway_motions.items() if with_rings else ():
         rings.setdefault(bearing, {}).update(
             {
                 f"{RING_ON[side]}_axial_um": 1e6 * motion.axial,

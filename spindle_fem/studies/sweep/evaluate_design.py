@@ -39,7 +39,7 @@ from spindle_fem.studies.run_checks import require_checks
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.sweep.designs import Design
 from spindle_fem.studies.sweep.morphing import lattice_assembly, move_mesh, moved_digest
-from spindle_fem.studies.sweep.outputs import derived_values, of_shape, value_of
+from spindle_fem.studies.sweep.outputs import derived_values, of_rings, of_shape, value_of
 from spindle_fem.studies.sweep.results_table import FAILED, FULL, IMPOSSIBLE, MOVED, NEW, OK, Row
 from spindle_fem.studies.sweep.structure import refusal, structure_digest, without_marks
 
@@ -292,7 +292,8 @@ def solve_checked(task: DesignTask, film_ratio: NDArray[np.float64] | None = Non
 
 def _values(result: ThermalResult, spec: MachineSpec, outputs: Iterable[str]) -> dict[str, Any]:
     outputs = tuple(outputs)
-    summary = build_summary(result, 0.0, 0.0, with_shape=any(map(of_shape, outputs)))
+    wanted = {"with_shape": any(map(of_shape, outputs)), "with_rings": any(map(of_rings, outputs))}
+    summary = build_summary(result, 0.0, 0.0, **wanted)
     summary["derived"] = derived_values(summary, spec)
     return {path: value_of(summary, path) for path in outputs}
 

@@ -118,6 +118,11 @@ def of_shape(path: str) -> bool:
     return path.startswith(("growth.", "displacements."))
 
 
+def of_rings(path: str) -> bool:
+    """Whether an output needs the deformed shapes of these bodies."""
+    return path.startswith("growth.rings.")
+
+
 def _paths(spec: MachineSpec) -> Iterator[str]:
     yield from _GENERAL
     names = [bearing.name for _, bearing in spec.bearings]
