@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from spindle_fem.errors import NoSteadyStateError, SpindleFemError
 from spindle_fem.model.mesh.column_solver import solve_many
 from spindle_fem.model.mesh.equations import assemble_system
+from spindle_fem.model.mesh.kernels.compile import wait_for_columns
 from spindle_fem.model.mesh.linear_system import ThermalSystem
 from spindle_fem.model.mesh.steady_conduction import ConductionSolution, solve_steady, split_unknowns
 from spindle_fem.operation.bearing_heat import BearingTemperatures
@@ -124,6 +125,7 @@ class HeatResponse:
         matrix, n_lumped, tie = tied.full_matrix().astype(RESPONSE_PRECISION), system.n_lumped, system.tie
         del system, tied  # their memory serves the solution
         warmed = entering
+        wait_for_columns()
         warmed[:, solved_for] = solve_many(
             matrix, entering[:, solved_for], solved.preconditioner, relative_tolerance=RESPONSE_TOLERANCE
         )

@@ -15,7 +15,7 @@ from spindle_fem.machine.meshing.build_mesh import build_mesh
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedLink, LumpedNode
-from spindle_fem.model.mesh.kernels.compile import compile_kernels
+from spindle_fem.model.mesh.kernels.compile import begin_compiling
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, build_operators
 from spindle_fem.operation.bearing_heat import (
     BearingMechanics,
@@ -29,7 +29,6 @@ from spindle_fem.operation.machine_loads import FieldState, LoadsBuilder
 from spindle_fem.operation.named_places import place_load
 from spindle_fem.operation.seat_joints import SeatJoints
 from spindle_fem.operation.source_terms import SOURCE_PREFIX
-from spindle_fem.parallel import beside
 
 Progress = Callable[[str], None]
 
@@ -136,7 +135,7 @@ def prepare_machine(
     """
     clock = Clock(progress)
     clock.begin("geometry")
-    kernels = beside(compile_kernels)
+    kernels = begin_compiling()
     assembly = build_assembly(spec)
     clock.begin("mesh")
     mesh = build_mesh(
@@ -146,9 +145,10 @@ def prepare_machine(
         sizes=spec.mesh.size,
     )
     clock.begin("assembly")
-    kernels()
+    kernels["elements"]()
     operators = build_operators(mesh, spec.mesh.order)
     machine = machine_on_mesh(spec, mesh, operators)
+    kernels["steady"]()
     clock.end()
     return replace(machine, timings=clock.timings)
 

@@ -14,6 +14,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.machine.view.place_names import ACROSS, AROUND, NEAR, UP
+from spindle_fem.model.mesh.kernels.compile import wait_for_columns
 from spindle_fem.model.reduced.growing_projection import GrowingProjection
 from spindle_fem.model.reduced.kept_operators import keep_operators, kept_operators
 from spindle_fem.model.reduced.mesh_model import MeshModel, build_mesh_model
@@ -299,6 +300,7 @@ def build_reduced_model(
     chosen = options or ReductionOptions()
     sampler = _Sampler.of(spec, full, chosen)
     nominal = sampler.sample({}, sampler.usual_speed)
+    wait_for_columns()
     grown = GrowingProjection(full, nominal, None if near is None else (near.fields, near.model))
     wanted = None
     if near is None:

@@ -8,6 +8,6 @@ cache; ``python -m spindle_fem.model.mesh.kernels.compile`` fills it.
 """
 
 # numba's options: kept on disk, run without the interpreter's lock, division by zero as in numpy.
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 # Also allow sums in any order, which vector instructions need.
 FAST = {**OPTIONS, "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
