@@ -65,8 +65,14 @@ class MeshModel(ThermalModel):
         )
 
 
-def build_mesh_model(machine: PreparedMachine) -> MeshModel:
+def build_mesh_model(machine: PreparedMachine, growth_of: MeshModel | None = None) -> MeshModel:
     """Split a prepared machine into its unit operators.
+
+    Parameters
+    ----------
+    growth_of : MeshModel, optional
+        Without displacement sensors, on as many nodes: its rows of growing bodies, which take longer than
+        all others, are taken.
 
     Raises
     ------
@@ -85,8 +91,9 @@ def build_mesh_model(machine: PreparedMachine) -> MeshModel:
     lumped = _lumped_nodes(machine)
     size = operators.n_unknowns + len(lumped)
     names = tuple(name for name, _ in lumped)
-    with BackgroundProcess(partial(GrowthWorker, machine), beside=machine.growth is None) as growth:
-        grown = growth.ask("rows", size)
+    beside = growth_of is None and machine.growth is None
+    with BackgroundProcess(partial(GrowthWorker, machine), beside=beside) as growth:
+        grown = growth.ask("rows", size) if growth_of is None else lambda: None
         coefficients = _conduction(machine, lumped, size)
         films = tuple(f"film.{surface}" for film in spec.film for surface in film.surface)
         storage = _storage(machine, names, size)
@@ -106,6 +113,10 @@ def build_mesh_model(machine: PreparedMachine) -> MeshModel:
         places |= found.places
         if found.shifts.shape[0]:
             growing["ring_shifts"] = found.shifts
+    if growth_of is not None:
+        own = zip(growth_of.place_names, growth_of.places.toarray(), strict=True)
+        places |= {name: row for name, row in own if name not in places}
+        growing["ring_shifts"] = growth_of.ring_shifts
     return MeshModel(
         coefficient_names=tuple(coefficients),
         operators=tuple(coefficients.values()),

@@ -145,7 +145,7 @@ class Moved:
         """Model with some units of the direction, on the same elements."""
         mesh = full.movable.moved(full.movable.displacement(self.faces, self.channel), amount)
         keys = {key: amount * value for key, value in self.channel_keys.items()}
-        return moved_model(full.machine, mesh, keys)
+        return moved_model(full, mesh, keys)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,12 +232,14 @@ class WarmAbove:
 
 
 # ------------------------------------------------------------------ differences
-def moved_model(machine: PreparedMachine, mesh: TaggedMesh, channel: Mapping[str, float]) -> MeshModel:
+def moved_model(full: FullMachine, mesh: TaggedMesh, channel: Mapping[str, float]) -> MeshModel:
     """Model of a machine on the same elements with their nodes elsewhere, and its channel's keys changed."""
-    spec = with_channel(machine.spec, channel)
+    spec = with_channel(full.machine.spec, channel)
     # The mesh no longer measures what the solid model does, on purpose.
     operators = build_operators(mesh, 1, area_tolerance=np.inf)
-    return build_mesh_model(machine_on_mesh(spec, mesh, operators))
+    # Temperatures are weighed for the growth of seats as before; what a sensor of displacement sees is not.
+    growth_of = None if spec.displacement_sensor else full.model
+    return build_mesh_model(machine_on_mesh(spec, mesh, operators), growth_of)
 
 
 def with_channel(spec: MachineSpec, changes: Mapping[str, float]) -> MachineSpec:
