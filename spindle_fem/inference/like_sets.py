@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from scipy.special import expit
 
-from spindle_fem.effects.framework.effect import in_intervals
+from spindle_fem.effects.framework.effect import IntervalEffect, in_intervals
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Ranked
@@ -29,6 +29,25 @@ def may_stand_for(fit: Fit, other: Fit, overlapping: Mapping[str, frozenset[str]
 def free_in_time(fit: Fit) -> int:
     """Number of effects of a set that are on in intervals."""
     return sum(in_intervals(effect_of(c.effect), c) for c in fit.candidates)
+
+
+def leaves_unnamed(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
+    """Whether a set says of one effect of another, which names its law, only that heat is missing there.
+
+    What no law is known for is the answer where no law of the catalogue reads the same: beside one that
+    does, it is the same heat or loss at the same place without its name.
+    """
+    others = [c for c in fit.candidates if (c.effect, c.component) not in chosen.keys]
+    named = [c for c in chosen.candidates if (c.effect, c.component) not in fit.keys]
+    if not len(others) == len(named) == 1:
+        return False
+    (other,), (law,) = others, named
+    return (
+        isinstance(effect_of(other.effect), IntervalEffect)
+        and not isinstance(effect_of(law.effect), IntervalEffect)
+        and other.kind == law.kind
+        and other.component in {law.component, *overlapping.get(law.component, ())}
+    )
 
 
 def are_alike(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.special import expit, logit
 from scipy.stats import chi2, norm
 
 from spindle_fem.effects.framework.effect import Candidate
@@ -18,6 +19,7 @@ from spindle_fem.inference.like_sets import (
     as_one,
     free_in_time,
     holds,
+    leaves_unnamed,
     may_stand_for,
     with_needed_thirds,
 )
@@ -36,6 +38,8 @@ CONTRADICTED_REASON = (
 )
 # Shift of an uncertain parameter that its prior holds with at least 1 %.
 PRIOR_SIGMAS = float(norm.ppf(0.995))
+# Name of the parameter of what swings that means nothing without the swing.
+PERIOD = "period"
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +165,9 @@ def counted(gain: float) -> float:
 def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int, coarseness: float = 1.0) -> float:
     """Probability that some set of effects would improve a consistent recording as much.
 
-    Wilks' theorem for each set with its free parameters; the lowest level is
+    Wilks' theorem for each set with its free parameters, but for periods, which
+    exist only with an effect: the gain is the largest of as many as a period is
+    known more closely than before (:func:`closer_periods`). The lowest level is
     held against those of consistent recordings of concealed machines, with
     Šidák's correction for as many trials as the candidates amount to. So a
     small structural difference between model and machine, which the slow error
@@ -185,11 +191,27 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int, coarseness:
         if freedom and gain > 0.0:
             # Pairs, and what is on in intervals, were chosen among so many more.
             chosen_among = max(0.0, likely - item.log_prior)
-            lowest = min(lowest, float(chi2.logsf(gain, freedom)) + chosen_among)
+            periods, among = closer_periods(item.fit)
+            level = float(chi2.logsf(gain, max(1, freedom - periods))) + among
+            lowest = min(lowest, level + chosen_among)
     if lowest == 0.0:
         return 1.0
     single = min(float(np.exp(lowest / (coarseness * tuned.CHANCE_DIVISOR))), 1.0 - 1e-16)
     return float(-np.expm1((1.0 + trials / tuned.CANDIDATES_A_TRIAL) * np.log1p(-single)))
+
+
+def closer_periods(fit: Fit) -> tuple[int, float]:
+    """Number of fitted periods, and logarithm of how many times closer they are known than before.
+
+    As many swings of other periods would have been taken for this one by chance.
+    Source: Davies (1987), Biometrika 74, 33-43, for a size and a phase.
+    """
+    free = {name for c in fit.candidates for name, item in c.free.items() if item.name == PERIOD}
+    at = [place for place, c in enumerate(fit.coordinates) if c.name in free]
+    if not at:
+        return 0, 0.0
+    variances = np.diag(fit.covariance)[at]
+    return len(at), float(-0.5 * np.log(np.minimum(variances, 1.0)).sum())
 
 
 def within_prior(fit: Fit, calibrated: bool) -> bool:
@@ -260,11 +282,14 @@ def judge(
     odds = {item.fit.keys: _log_odds(item, empty) for item in ranked}
     nothing = 0.0
     if p_value <= tuned.SIGNIFICANT:
-        nothing = min(empty.probability, tuned.STILL_POSSIBLE) if p_value >= tuned.RULED_OUT else 0.0
         ranked = _without(ranked, empty)
     if coarseness == 1.0:
         ranked = with_needed_thirds(ranked)
     chosen = ranked[0]
+    if tuned.RULED_OUT <= p_value <= tuned.SIGNIFICANT:
+        # Held-out readings were no part of what made the sets likely.
+        more = _heldout_gain(chosen.best, empty.best) if coarseness == 1.0 else 0.0
+        nothing = min(float(expit(logit(empty.probability) - more)), tuned.STILL_POSSIBLE)
 
     def predicts(item: Ranked) -> bool:
         return _predicts(item.best, empty.best, left, beyond, coarseness, odds[item.fit.keys])
@@ -307,6 +332,7 @@ def judge(
         for item in rivals
         if item.probability >= tuned.NEAR_PROBABILITY
         and may_stand_for(item.fit, chosen.fit, known_as_one)
+        and not leaves_unnamed(item.fit, chosen.fit, known_as_one)
         and _told_by_readings(chosen.best, item.best, coarseness) < tuned.LEAST_HELDOUT_GAIN
         and apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
     ]
@@ -373,8 +399,15 @@ def _predicts(
     if coarseness > 1.0 and max(left(empty.fit), beyond(empty.fit)) > 1.0:
         lower = beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
         return lower and left(chosen.fit) <= left(empty.fit)
-    gain = 0.5 * (empty.heldout - chosen.heldout) / tuned.GAIN_DIVISOR
+    gain = _heldout_gain(chosen, empty)
     return max(gain, gain + odds if coarseness == 1.0 else gain) >= tuned.LEAST_HELDOUT_GAIN
+
+
+def _heldout_gain(chosen: Hypothesis, empty: Hypothesis) -> float:
+    """Logarithm of the odds of a set over nothing missing by held-out readings; 0 where there are none."""
+    if chosen.heldout is None or empty.heldout is None:
+        return 0.0
+    return 0.5 * (empty.heldout - chosen.heldout) / tuned.GAIN_DIVISOR
 
 
 def _told_by_readings(chosen: Hypothesis, other: Hypothesis, coarseness: float) -> float:

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spindle_fem.inference import tuned
+from spindle_fem.inference import like_sets, tuned
 from spindle_fem.inference.verdict import NEAR_REASON, rank
-from tests.support.made_hypotheses import CHURNING, OFFSET, PRELOAD, hypothesis, verdict
+from tests.support.made_hypotheses import CHURNING, OFFSET, PRELOAD, candidate, hypothesis, verdict
 
 
 def test_a_third_beside_two_that_fit_within_the_errors_is_as_probable_as_held_out_readings_say():
@@ -51,3 +51,23 @@ def test_rivals_at_places_that_count_as_one_are_one_rival():
     (rival,) = together.alternatives
     assert rival.probability == pytest.approx(2.0 * each * together.chosen.probability, rel=0.05)
     assert verdict(*found[:3], **like).verdict == "missing_physics"
+
+
+def test_heat_without_a_name_is_no_rival_for_a_law_at_its_place(monkeypatch):
+    """It says the same of the machine; elsewhere, beside a sensor, or named itself it remains one."""
+    # as heat is that follows a recorded quantity
+    monkeypatch.setattr(like_sets, "in_intervals", lambda effect, candidate: False)
+    places = ("front_bearings", "F1", "F2")
+    alike = {"apart": lambda one, other: 0.0, "overlapping": dict.fromkeys(places, frozenset(places))}
+
+    def said(law, place, *beside):
+        heat = hypothesis(candidate("unrecorded_heat_source", place), *beside, misfit=400.0, log_prior=-2.5)
+        return verdict(hypothesis(misfit=1400.0), hypothesis(law, *beside, misfit=400.0), heat, **alike)
+
+    assert [said(CHURNING, place).verdict for place in ("front_bearings", "F2")] == ["missing_physics"] * 2
+    assert said(CHURNING, "F2", OFFSET).verdict == "missing_physics"
+    (listed,) = said(CHURNING, "F2").alternatives
+    assert listed.fit.candidates[0].effect == "unrecorded_heat_source"
+    assert (said(CHURNING, "nose").verdict, said(CHURNING, "nose").reason) == ("ambiguous", NEAR_REASON)
+    assert said(candidate("sensor_gain", "F2", "sensor"), "F2").verdict == "ambiguous"
+    assert said(candidate("unrecorded_cooling"), "front_bearings").verdict == "ambiguous"
