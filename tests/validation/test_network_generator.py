@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from spindle_fem.definition.network_load import load_network_machine
 from validation import generate_networks
 from validation.generate_networks import choose, draw_machine, judge, make_case
-from validation.networks.conceal import CONCEALED, Scene
+from validation.networks.conceal import CONCEALED, Lie, Scene
 from validation.networks.truth import Change, Network, Work, march
 
 FOLDER = Path(generate_networks.__file__).parent
@@ -39,6 +39,13 @@ def test_modal_steps_agree_with_an_ordinary_solver():
 
     exact = solve_ivp(rate, (0.0, time[-1]), np.full(3, around[0]), t_eval=time, rtol=1e-8, max_step=20.0)
     assert np.abs(found - exact.y[:2].T).max() < 0.01
+
+
+def test_a_lagging_sensor_follows_a_ramp_as_a_first_order_one():
+    time = np.arange(0.0, 6000.0, 30.0)
+    ramp = 20.0 + 1e-3 * time
+    read = Lie("sensor_lag", "body", 600.0).applied(time, ramp, ramp)
+    assert read == pytest.approx(20.0 + 1e-3 * (time - 600.0 * (1.0 - np.exp(-time / 600.0))), abs=1e-12)
 
 
 def test_every_fifth_case_conceals_nothing_and_every_family_has_its_turn():

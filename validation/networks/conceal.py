@@ -7,6 +7,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..concealed_effect import KINDS
+from ..sensor_errors import first_order
 from .scene import Owner
 from .truth import NOTHING, Array, Change
 from .work import log_uniform, stretches
@@ -39,8 +40,7 @@ class Lie:
         if self.effect == "sensor_detached":
             apart = self.size * (time >= self.onset)
             return reading + apart * (around - reading)
-        keep = np.exp(-(time[1] - time[0]) / max(self.size, 1e-3))
-        return lfilter([1.0 - keep], [1.0, -keep], reading, zi=[keep * reading[0]])[0]
+        return first_order(time, reading, max(self.size, 1e-3))
 
 
 @dataclass(frozen=True, slots=True)
