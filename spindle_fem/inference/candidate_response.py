@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -248,6 +248,19 @@ class BaseRun:
         if self._told is None:
             self._told = self.predictor.predict(self.number, self.values, self.candidates).temperature
         return self._told
+
+    def before_sensors(self) -> Array:
+        """What the channels would read if no sensor effect of the set distorted them, (G + 1, c) K.
+
+        A change of the machine or of what a probe feels is passed through those effects afterwards.
+        """
+        if all(c.reading is None for c in self.candidates):
+            return self.predicted()
+        machine = [replace(c, reading=None) for c in self.candidates]
+        shared = {name for c in machine for name in c.parameters}
+        lying = {name for c in self.candidates for name in c.parameters} - shared
+        values = {name: value for name, value in self.values.items() if name not in lying}
+        return self.predictor.predict(self.number, values, machine).temperature
 
     def _reading(self, variant: Variant) -> Array:
         """Difference of one channel that a sensor effect makes, (G + 1, c)."""

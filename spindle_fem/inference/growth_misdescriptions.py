@@ -14,7 +14,7 @@ EXPANSION_SIGMA = 0.04
 
 def expansion(base: BaseRun) -> Change:
     """Displacements since assembly for as much growth again; temperatures stay."""
-    grown = base.predicted().copy()
+    grown = base.before_sensors().copy()
     grown[:, : base.predictor.recordings[base.number].temperature_count] = 0.0
     return Change(direct=grown)
 

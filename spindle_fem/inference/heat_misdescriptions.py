@@ -113,7 +113,7 @@ def _more(base: BaseRun, coefficients: Sequence[str], start: Array | float, end:
 
 def clock_change(base: BaseRun) -> Change:
     """Temperatures stamped a second later than the inputs: readings are those of a second before."""
-    return Change(direct=-np.gradient(base.predicted(), base.drive.grid, axis=0))
+    return Change(direct=-np.gradient(base.before_sensors(), base.drive.grid, axis=0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,10 +125,11 @@ class Response:
     def __call__(self, base: BaseRun) -> Change:
         """To first order a delay and a lag are the same."""
         names = base.predictor.recordings[base.number].temperature_names
-        late = np.zeros_like(base.predicted())
+        felt = base.before_sensors()
+        late = np.zeros_like(felt)
         if self.channel in names:
             column = names.index(self.channel)
-            late[:, column] = -np.gradient(base.predicted()[:, column], base.drive.grid)
+            late[:, column] = -np.gradient(felt[:, column], base.drive.grid)
         return Change(direct=late)
 
 

@@ -117,6 +117,20 @@ def test_a_slow_sensor_moves_its_own_channel_only(predictor):
     assert not column_of(predictor, Response("elsewhere")).any()
 
 
+@pytest.mark.parametrize("effect", ["clock_shift", "sensor_gain"])
+def test_what_a_probe_feels_late_passes_through_a_sensor_that_lies_once(case, predictor, effect):
+    lying = case.candidates[effect, "SP02"]
+    values = {lying.amplitude: 900.0 if effect == "clock_shift" else 3.0}
+    late = Misdescription("late", "", "", 1.0, "", Response("SP02"))
+    about = with_misdescriptions(predictor, [late], values, [lying])
+    alone = with_misdescriptions(predictor, [late])
+    told, expected = (
+        own.predict(0, values, [lying], [late.coordinate]).sensitivity[:, :, 0] for own in (about, alone)
+    )
+    assert np.abs(expected[:, 1]).max() > 0.0
+    np.testing.assert_allclose(told, expected, atol=1e-12)
+
+
 def test_the_improved_machine_has_the_table_put_right(case):
     share = 0.1
     shape = SpeedShape(FRONT, (0.0, 1000.0), (0.0, 1.0))
