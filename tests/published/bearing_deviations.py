@@ -43,6 +43,7 @@ from tests.published.test_measured_friction import (
     ring_to_ring,
     rolling_forces,
     run_down_force,
+    sump_over_mist,
 )
 
 Row = tuple[str, str, float, float]
@@ -164,6 +165,16 @@ def measured_rows() -> list[Row]:
     found += [
         (f"{kind} bearing, 40 mm bore", "friction, oil bath over minimum oil", 2.0, ratio)
         for kind, ratio in bath_over_minimum_oil().items()
+    ]
+    words = {"palmgren": "Palmgren", "skf": "SKF", "full": "full", "drag": "full with drag"}
+    found += [
+        (
+            "angular-contact bearing (7010 C taken)",
+            f"friction, oil sump over oil mist, {words[model]}",
+            4 / 3,
+            ratio,
+        )
+        for model, ratio in sump_over_mist().items()
     ]
     for size, load in RUN_DOWNS:
         for rpm in (60, 210):
