@@ -18,6 +18,9 @@ from spindle_fem.errors import UnitError
 
 ZERO_CELSIUS_K = 273.15
 
+# In a metre. Models and fits take displacements in micrometres, as large in number as temperatures are.
+MICROMETRES = 1.0e6
+
 # Units of recorded inputs as pint writes them.
 TEMPERATURE_UNIT = "kelvin"
 ANGULAR_SPEED_UNIT = "radian / second"

@@ -19,13 +19,13 @@ from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.parallel import one_thread
-from spindle_fem.recordings.displaced_readings import MICROMETRES
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_transient import simulate_full, start_at
 from spindle_fem.solvers.mesh_terms import Physics
 from spindle_fem.solvers.prepared_machine import PreparedMachine
 from spindle_fem.solvers.transient_records import MachineTransient, TransientOptions
+from spindle_fem.units import MICROMETRES
 
 Array = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from spindle_fem.inference.schedules import HOLD, geometry_schedules, network_sc
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.reduced.drive import STANDARD, Drive, make_drive
 from spindle_fem.model.reduced.run_start import Start
-from spindle_fem.recordings.displaced_readings import MICROMETRES
+from spindle_fem.units import MICROMETRES
 
 Array = NDArray[np.float64]
 

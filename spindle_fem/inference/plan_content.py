@@ -17,7 +17,7 @@ from spindle_fem.inference.measurement_plan import (
 )
 from spindle_fem.inference.planned_test import Sensor
 from spindle_fem.inference.told_apart import FALSE_ALARM, POWER
-from spindle_fem.recordings.displaced_readings import MICROMETRES
+from spindle_fem.units import MICROMETRES
 
 SCHEMA = "spindle-fem/plan/1"
 # Effects that are listed for one, those that read most like it first.

@@ -8,9 +8,7 @@ import numpy as np
 
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.channel_checks import Flag
-
-# Makes displacements comparable in size with kelvins, in the unit that models of machines use.
-MICROMETRES = 1.0e6
+from spindle_fem.units import MICROMETRES
 
 
 def with_displacements(recording: Recording) -> Recording:

@@ -17,8 +17,7 @@ from spindle_fem.inference.next_measurement import hypothesis_words
 from spindle_fem.inference.verdict import rank
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.conditions import operating_conditions
-from spindle_fem.recordings.displaced_readings import MICROMETRES
-from spindle_fem.units import ZERO_CELSIUS_K
+from spindle_fem.units import MICROMETRES, ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -16,7 +16,6 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from spindle_fem.recordings.align import LONG_GAP_STEPS, Recording
-from spindle_fem.recordings.displaced_readings import MICROMETRES
 from spindle_fem.report.clock_axis import label_times, time_scale
 from spindle_fem.report.figure_style import (
     CYCLE,
@@ -27,7 +26,7 @@ from spindle_fem.report.figure_style import (
     set_title,
     styled,
 )
-from spindle_fem.units import ZERO_CELSIUS_K
+from spindle_fem.units import MICROMETRES, ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
     import xarray as xr

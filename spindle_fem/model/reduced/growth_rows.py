@@ -12,11 +12,9 @@ from spindle_fem.model.elastic.machine_bodies import carries_rings
 from spindle_fem.model.elastic.machine_growth import GrowthModel
 from spindle_fem.operation.named_places import growth_places
 from spindle_fem.solvers.prepared_machine import PreparedMachine
+from spindle_fem.units import MICROMETRES
 
 Array = NDArray[np.float64]
-
-# Readings of displacement sensors are in micrometres, as large in number as those in kelvins.
-MICROMETRES = 1.0e6
 
 
 @dataclass(frozen=True, slots=True)
