@@ -96,6 +96,7 @@ class BaseRun:
         self.channels = len(self.columns) + len(self.places)
         self._coefficient: dict[str, Array] = {}
         self._told: Array | None = None
+        self._felt: Array | None = None
 
     # ------------------------------------------------------------------ answers
     def outputs(self, tangent: Array, inlet: Array | None = None) -> Array:
@@ -256,11 +257,13 @@ class BaseRun:
         """
         if all(c.reading is None for c in self.candidates):
             return self.predicted()
-        machine = [replace(c, reading=None) for c in self.candidates]
-        shared = {name for c in machine for name in c.parameters}
-        lying = {name for c in self.candidates for name in c.parameters} - shared
-        values = {name: value for name, value in self.values.items() if name not in lying}
-        return self.predictor.predict(self.number, values, machine).temperature
+        if self._felt is None:
+            machine = [replace(c, reading=None) for c in self.candidates]
+            shared = {name for c in machine for name in c.parameters}
+            lying = {name for c in self.candidates for name in c.parameters} - shared
+            values = {name: value for name, value in self.values.items() if name not in lying}
+            self._felt = self.predictor.predict(self.number, values, machine).temperature
+        return self._felt
 
     def _reading(self, variant: Variant) -> Array:
         """Difference of one channel that a sensor effect makes, (G + 1, c)."""
