@@ -228,8 +228,11 @@ def diagnose_recordings(
         beyond=readings.beyond,
         coarseness=coarseness,
     )
-    null = next(h.fit for h in refitted if not h.fit.candidates)
-    judgement = with_wrong_definition(judgement, null, wrong)
+    null, told = next(h for h in refitted if not h.fit.candidates), 0.0
+    if wrong is not None and null.heldout is not None:
+        within = Problem(unchanged, calibrated.known, slow, predictor.observations).fit((), null.fit.values)
+        told = 0.5 * (readings.heldout_misfit(within) - null.heldout) / (coarseness * tuned.GAIN_DIVISOR)
+    judgement = with_wrong_definition(judgement, null.fit, wrong, told)
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit
     followed = readings.followed(chosen_fit)
@@ -240,7 +243,7 @@ def diagnose_recordings(
         # On rows what a coarse picture leaves may pass for a state that flickers.
         followed = min(followed, finer, key=readings.left_with)
     explanations = []
-    about = problem.fit((), null.values)
+    about = problem.fit((), null.fit.values)
     patterns = [Pattern(spot, tuple(p for p in own if p in known)) for spot, own in view.spots.items()]
     for number in range(len(recordings)):
         explanations += [
@@ -254,7 +257,7 @@ def diagnose_recordings(
         calibrated,
         tuple(refitted),
         judgement,
-        null,
+        null.fit,
         judgement.chosen.fit,
         tuple(explanations),
         chosen[0][1],

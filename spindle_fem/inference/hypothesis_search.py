@@ -98,10 +98,12 @@ class Search:
         number: int,
         count: int,
         always: int = 0,
+        beside: bool = False,
     ) -> None:
         """Fit the ``count`` most promising additions of ``number`` effects to a hypothesis.
 
-        ``always`` of them are fitted whatever they promise.
+        ``always`` of them are fitted whatever they promise. ``beside`` the best set also those
+        that promise a little less than nothing: to first order a small effect gains less than it does.
         """
         if len(fit.candidates) + number > LARGEST_SET:
             return
@@ -110,9 +112,9 @@ class Search:
         for tried, (members, gain) in enumerate(screened.best(number, count)):
             if tried == 0:
                 promised = gain
-            if tried >= always and (
-                gain < tuned.LEAST_PROMISED_GAIN or gain < tuned.LEAST_PROMISED_SHARE * promised
-            ):
+            short = tuned.PROMISED_SHORT if beside else 0.0
+            least = max(tuned.LEAST_PROMISED_GAIN, tuned.LEAST_PROMISED_SHARE * promised)
+            if tried >= always and gain < least - short:
                 break
             if number > 1 and gain < known:
                 break

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from scipy.special import expit
+import numpy as np
 
 from spindle_fem.effects.framework.effect import IntervalEffect, in_intervals
 from spindle_fem.effects.registry import effect_of
@@ -77,10 +77,10 @@ def holds(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> b
 
 
 def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
-    """Sets, a third effect beside two that fit within the errors as probable as held-out readings say.
+    """Sets, a third effect beside two that fit less probable where held-out readings doubt it.
 
-    Two leave the errors of their laws, which a third may fit: its gain of fitted readings is no evidence.
-    As for a first effect, held-out ones must be twenty to one for it.
+    Two that fit within the errors leave those of their laws, which a third may fit: its odds are lowered by
+    what held-out readings lack of twenty to one for it.
     """
     shares = {item.fit.keys: item.probability for item in ranked}
     for item in ranked:
@@ -95,9 +95,10 @@ def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
             continue
         pair = min(pairs, key=lambda other: other.best.heldout)
         gain = 0.5 * (pair.best.heldout - item.best.heldout) / tuned.GAIN_DIVISOR
-        both = shares[item.fit.keys] + shares[pair.fit.keys]
-        third = min(shares[item.fit.keys], both * float(expit(gain - tuned.LEAST_HELDOUT_GAIN)))
-        shares[item.fit.keys], shares[pair.fit.keys] = third, both - third
+        doubt = float(np.exp(min(0.0, gain - tuned.LEAST_HELDOUT_GAIN)))
+        third, two = shares[item.fit.keys], shares[pair.fit.keys]
+        lowered = (third + two) * third * doubt / max(third * doubt + two, np.finfo(float).tiny)
+        shares[item.fit.keys], shares[pair.fit.keys] = lowered, third + two - lowered
     found = [replace(item, probability=shares[item.fit.keys]) for item in ranked]
     return sorted(found, key=lambda item: -item.probability)
 

@@ -58,7 +58,8 @@ def run_search(search: Search) -> list[Hypothesis]:
         search.progress(f"diagnosis: {size + 1} effects")
         for hypothesis in to_extend(search, ranked, _beam(search, best, size)):
             screened, intervals = search.screened(hypothesis.fit)
-            search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS)
+            beside = not is_network and hypothesis is best
+            search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS, beside=beside)
     improve(search)
     # With geometry laws come first: fits take long there, and something that switches fits most of them.
     if not is_network and search.ranked()[0].fit.reduced_misfit > tuned.UNEXPLAINED_MISFIT**2:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.special import expit, logit
 from scipy.stats import chi2, norm
 
 from spindle_fem.effects.framework.effect import Candidate
@@ -99,7 +98,9 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
     """Logarithm of prior, complexity and likelihood over nothing missing, the last as far as it counts.
 
     Complexity (the determinants of Laplace's evidence) counts in full, with
-    amplitudes that may have any order of magnitude (:func:`any_magnitude`).
+    amplitudes that may have any order of magnitude (:func:`any_magnitude`). Held-out readings of a machine
+    that is drawn, where all sets have them, are readings like the fitted ones: what a set gains there counts
+    as much.
 
     Parameters
     ----------
@@ -112,6 +113,8 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
     in_a_size = tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness))
     null = next(h for h in hypotheses if not h.fit.candidates)
     gains = [0.5 * (1.0 - h.course_share) * (null.misfit - h.misfit) for h in hypotheses]
+    if coarseness == 1.0 and all(h.heldout is not None for h in hypotheses):
+        gains = [gain + 0.5 * (null.heldout - h.heldout) for gain, h in zip(gains, hypotheses, strict=True)]
     # Within a size; the best set of a size is then compared with other sizes.
     scores = [
         float(
@@ -279,7 +282,8 @@ def judge(
     ranked = rank(hypotheses, coarseness)
     p_value = detection_p_value(hypotheses, trials, coarseness)
     empty = next(item for item in ranked if not item.fit.candidates)
-    odds = {item.fit.keys: _log_odds(item, empty) for item in ranked}
+    fitted = {i.fit.keys: i for i in rank([replace(h, heldout=None) for h in hypotheses], coarseness)}
+    odds = {keys: _log_odds(item, fitted[empty.fit.keys]) for keys, item in fitted.items()}
     nothing = 0.0
     if p_value <= tuned.SIGNIFICANT:
         ranked = _without(ranked, empty)
@@ -287,9 +291,7 @@ def judge(
         ranked = with_needed_thirds(ranked)
     chosen = ranked[0]
     if tuned.RULED_OUT <= p_value <= tuned.SIGNIFICANT:
-        # Held-out readings were no part of what made the sets likely.
-        more = _heldout_gain(chosen.best, empty.best) if coarseness == 1.0 else 0.0
-        nothing = min(float(expit(logit(empty.probability) - more)), tuned.STILL_POSSIBLE)
+        nothing = min(empty.probability, tuned.STILL_POSSIBLE)
 
     def predicts(item: Ranked) -> bool:
         return _predicts(item.best, empty.best, left, beyond, coarseness, odds[item.fit.keys])
@@ -307,9 +309,11 @@ def judge(
         nothing_left, misfit_left = left(empty.fit), float(np.sqrt(empty.fit.reduced_misfit))
         much_left = misfit_left > tuned.UNEXPLAINED_MISFIT or nothing_left > tuned.MOST_LEFT
         in_prior = within_prior(chosen.fit, calibrated)
-        # Where likelihoods hold, readings may contradict the model although no set tells held-out ones.
+        # Where likelihoods hold, readings may contradict the model although no set tells held-out ones; not
+        # those that leave no more than their noise.
+        more_left = max(nothing_left, beyond(empty.fit)) > 1.0
         contradicted = coarseness == 1.0 and bool(chosen.fit.candidates) and p_value < tuned.RULED_OUT
-        if not (much_left or contradicted) or (nothing_left <= tuned.MOST_LEFT and in_prior):
+        if not (much_left or (contradicted and more_left)) or (nothing_left <= tuned.MOST_LEFT and in_prior):
             return Judgement("consistent", p_value, empty, (), 0.0, "")
         # The residual is there, and no set of the catalogue makes it likelier.
         left_over, reason = p_value, CONTRADICTED_REASON

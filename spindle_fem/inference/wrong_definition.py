@@ -94,9 +94,22 @@ def without_prior(belief: Belief, row: int) -> Belief:
     return replace(belief, coordinates=tuple(coordinates), root=root)
 
 
-def with_wrong_definition(judgement: Judgement, null: Fit, wrong: WrongDirection | None) -> Judgement:
-    """A judgement that nothing is missing, changed to a wrong definition if its direction explains more."""
+def with_wrong_definition(
+    judgement: Judgement, null: Fit, wrong: WrongDirection | None, told: float = 0.0
+) -> Judgement:
+    """A judgement that nothing is missing, changed to a wrong definition if its direction explains more.
+
+    Parameters
+    ----------
+    null : Fit
+        With nothing missing, that prior given up.
+    told : float
+        What held-out readings become likelier by, as a logarithm that counts. As for a set of effects, the
+        sum with what fitted ones do must be twenty to one.
+    """
     if wrong is None or judgement.verdict != "consistent":
+        return judgement
+    if wrong.log_gain + told < tuned.LEAST_HELDOUT_GAIN:
         return judgement
     item = wrong.direction
     index = next(i for i, c in enumerate(null.coordinates) if c.name == item.coordinate)

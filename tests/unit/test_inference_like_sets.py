@@ -6,33 +6,32 @@ import numpy as np
 import pytest
 
 from spindle_fem.inference import like_sets, tuned
+from spindle_fem.inference.hypothesis import Ranked
+from spindle_fem.inference.like_sets import with_needed_thirds
 from spindle_fem.inference.verdict import NEAR_REASON, rank
 from tests.support.made_hypotheses import CHURNING, OFFSET, PRELOAD, candidate, hypothesis, verdict
 
 
-def test_a_third_beside_two_that_fit_within_the_errors_is_as_probable_as_held_out_readings_say():
-    nothing = replace(hypothesis(misfit=2000.0), heldout=900.0)
+def test_a_third_beside_two_that_fit_within_the_errors_is_less_probable_where_held_out_readings_doubt_it():
     pair = replace(hypothesis(PRELOAD, CHURNING, misfit=400.0), heldout=500.0)
     worse = replace(hypothesis(PRELOAD, OFFSET, misfit=420.0), heldout=700.0)
 
-    def said(gain, **others):
-        """Gain of held-out readings beyond twenty to one, as it counts."""
-        heldout = 500.0 - 2.0 * tuned.GAIN_DIVISOR * (tuned.LEAST_HELDOUT_GAIN + gain)
+    def odds(gain, two=pair):
+        """Of a third that was twice as probable, where held-out readings gain so much, as it counts."""
+        heldout = 500.0 - 2.0 * tuned.GAIN_DIVISOR * gain
         triple = replace(hypothesis(PRELOAD, CHURNING, OFFSET, misfit=300.0), heldout=heldout)
-        return verdict(nothing, pair, triple, worse, calibrated=True, **others)
+        ranked = with_needed_thirds([Ranked(triple, 0.6), Ranked(two, 0.3), Ranked(worse, 0.1)])
+        said = {id(item.best): item.probability for item in ranked}
+        assert list(said.values()) == sorted(said.values(), reverse=True)
+        assert said[id(triple)] + said[id(two)] == pytest.approx(0.9)
+        return said[id(triple)] / said[id(two)]
 
-    assert [len(said(gain).chosen.fit.keys) for gain in (-1.0, 1.0)] == [2, 3]
-    faint, clear = said(-1.0), said(4.0)
-    assert faint.evidence == pytest.approx(1.0 / (1.0 + np.exp(-1.0)), abs=0.01)
-    assert [len(item.fit.keys) for item in faint.alternatives] == [3]
-    # The two are sure, whether there is a third or not.
-    assert faint.verdict == "missing_physics"
-    assert clear.evidence > 0.98
-    # Two that leave more than errors need a third; likelihoods of a network are another matter.
-    left = replace(pair, fit=replace(pair.fit, misfit=1.1 * tuned.EXPLAINED**2 * len(pair.fit.residual)))
-    triple = replace(hypothesis(PRELOAD, CHURNING, OFFSET, misfit=300.0), heldout=500.0)
-    assert len(verdict(nothing, left, triple, calibrated=True).chosen.fit.keys) == 3
-    assert len(said(-1.0, coarseness=1.1).chosen.fit.keys) == 3
+    enough = tuned.LEAST_HELDOUT_GAIN
+    for gain in (enough - 4.0, enough - 1.0, enough, enough + 2.0):
+        assert odds(gain) == pytest.approx(2.0 * np.exp(min(0.0, gain - enough)))
+    # Two that leave more than errors need a third.
+    more = replace(pair, fit=replace(pair.fit, misfit=1.1 * tuned.EXPLAINED**2 * len(pair.fit.residual)))
+    assert odds(0.0, more) == pytest.approx(2.0)
 
 
 def test_rivals_at_places_that_count_as_one_are_one_rival():

@@ -70,6 +70,19 @@ def test_differences_of_likelihood_count_by_the_temperature():
     assert odds == pytest.approx(np.exp(4.0 / tuned.GAIN_DIVISOR_IN_A_SIZE))
 
 
+def test_held_out_readings_count_among_sets_as_fitted_ones_do():
+    nothing = replace(hypothesis(misfit=500.0, evidence=-1e4), heldout=900.0)
+    better = replace(hypothesis(PRELOAD, misfit=400.0), heldout=708.0)
+    told = replace(hypothesis(CHURNING, misfit=408.0), heldout=694.0)
+    ranked = rank([nothing, better, told])
+    assert ranked[0].fit is told.fit
+    odds = ranked[0].probability / ranked[1].probability
+    assert odds == pytest.approx(np.exp((7.0 - 4.0) / tuned.GAIN_DIVISOR_IN_A_SIZE))
+    # a coarse picture leaves more than noise there, and a set without them has none to compare
+    assert rank([nothing, better, told], 1.1)[0].fit is better.fit
+    assert rank([nothing, better, replace(told, heldout=None)])[0].fit is better.fit
+
+
 def test_a_gain_counts_less_beside_a_large_one_but_never_nothing():
     small, large = counted(1.0) - counted(0.0), counted(20_001.0) - counted(20_000.0)
     assert small == pytest.approx(1.0, rel=2e-3)
@@ -175,9 +188,10 @@ def test_a_set_is_named_where_fitted_and_held_out_readings_together_speak_for_it
     assert odds > 2.0 * tuned.LEAST_HELDOUT_GAIN
     least = 2.0 * tuned.GAIN_DIVISOR * (tuned.LEAST_HELDOUT_GAIN - odds)
     better, same = ((replace(preload, heldout=700.0 - gain), nothing) for gain in (least + 0.1, least - 0.1))
+    more = {"left": lambda fit: 1.2}
     assert verdict(*better).verdict == "missing_physics"
-    assert verdict(*same).verdict == "unexplained"
-    assert not verdict(*same).chosen.fit.candidates
+    assert verdict(*same, **more).verdict == "unexplained"
+    assert not verdict(*same, **more).chosen.fit.candidates
     # held-out readings alone are enough, and in a network needed
     alone = (
         replace(preload, heldout=700.0 - 2.0 * tuned.GAIN_DIVISOR * tuned.LEAST_HELDOUT_GAIN - 0.1),
@@ -204,10 +218,13 @@ def test_what_chance_does_not_leave_is_unexplained_where_no_set_tells_held_out_r
     clear, faint = (
         (nothing, replace(hypothesis(PRELOAD, misfit=2000.0 - gain), heldout=900.0)) for gain in (120.0, 24.0)
     )
-    said = verdict(*clear)
+    said = verdict(*clear, left=lambda fit: 1.1)
     assert said.p_value < tuned.RULED_OUT
     assert (said.verdict, said.reason) == ("unexplained", CONTRADICTED_REASON)
     assert not said.chosen.fit.candidates
+    assert verdict(*clear, beyond=lambda fit: 1.1).verdict == "unexplained"
+    # readings within their noise contradict nothing
+    assert verdict(*clear).verdict == "consistent"
     assert verdict(*faint).p_value > tuned.RULED_OUT
     assert verdict(*faint).verdict == "consistent"
     # likelihoods of a network, a coarse picture, prove less

@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from spindle_fem.inference import search_course, tuned
+from spindle_fem.inference.hypothesis import identity
+from spindle_fem.inference.hypothesis_search import Search
 
 
 class Ever:
@@ -63,3 +65,33 @@ def test_a_third_effect_beside_two_that_fit_is_looked_for_with_geometry(
     problem = SimpleNamespace(predictor=SimpleNamespace(is_network=is_network))
     search = SimpleNamespace(is_explained=lambda best: explained, problem=problem)
     assert search_course._beam(search, SimpleNamespace(keys=frozenset(members)), size) == beam
+
+
+def test_beside_the_best_set_additions_are_fitted_that_promise_little():
+    """To first order a small effect gains less than it does once its law is fitted."""
+    least, short = tuned.LEAST_PROMISED_GAIN, tuned.PROMISED_SHORT
+    best = 3.0 * least / tuned.LEAST_PROMISED_SHARE
+    share = tuned.LEAST_PROMISED_SHARE * best
+    gains = (best, share + 0.1, share - 0.1, share - short + 0.1, share - short - 0.1)
+
+    def fitted(gains, **more):
+        """Which additions are."""
+        found = []
+        search = SimpleNamespace(
+            ranked=lambda: [SimpleNamespace(score=9.0)],
+            found={identity(()): SimpleNamespace(score=0.0)},
+            task=lambda fit, additions, intervals: additions[0][0],
+            fit_all=found.extend,
+        )
+        screened = SimpleNamespace(
+            best=lambda number, count: [((i,), gain) for i, gain in enumerate(gains)][:count],
+            amplitudes=lambda members: dict.fromkeys(members, 1.0),
+            variants=list(range(len(gains))),
+        )
+        Search.extend(search, SimpleNamespace(candidates=("a",)), screened, {}, 1, 6, **more)
+        return found
+
+    assert fitted(gains) == [0, 1]
+    assert fitted(gains, beside=True) == [0, 1, 2, 3]
+    assert fitted((least - 0.1,)) == []
+    assert fitted((least - 0.1, least - short + 0.1, least - short - 0.1), beside=True) == [0, 1]
