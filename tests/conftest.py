@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import os
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +20,10 @@ if TYPE_CHECKING:
 # Modules and collected tests are millions of objects that stay: searching them for garbage again and again
 # took a tenth of the processor time.
 gc.set_threshold(50_000, 20, 20)
+# Without compiled modules on disk every worker compiles the package and rewrites the assertions of all tests,
+# and every command that a test starts compiles the package once more.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 def pytest_collection_finish():
