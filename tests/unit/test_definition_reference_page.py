@@ -28,24 +28,28 @@ def models_below(model):
 MODELS = list(dict.fromkeys([*models_below(MachineSpec), *models_below(NetworkMachineSpec)]))
 
 
+@pytest.fixture(scope="module")
+def page():
+    """The page as the models write it now."""
+    return reference_page()
+
+
 @pytest.mark.skipif(not PAGE.parent.is_dir(), reason="the page lies in the source tree, not in the wheel")
-def test_the_page_is_up_to_date():
-    assert PAGE.read_text(encoding="utf-8") == reference_page(), (
+def test_the_page_is_up_to_date(page):
+    assert PAGE.read_text(encoding="utf-8") == page, (
         "run: python -m scripts.definition_page > docs/machine_definition.md"
     )
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.__name__)
-def test_every_key_is_explained_and_listed(model):
-    page = reference_page()
+def test_every_key_is_explained_and_listed(model, page):
     texts = meanings(model)
     for key in fields_of((model,)):
         assert texts[key], f"{model.__name__}.{key} has no docstring under it"
         assert key == "marks" or getattr(model, "made", False) or f"| `{key}` |" in page
 
 
-def test_limits_units_and_defaults_stand_in_the_page():
-    page = reference_page()
+def test_limits_units_and_defaults_stand_in_the_page(page):
     for line in (
         '| `depth` | Radial height of the section. | a quantity such as "19 mm", above 0 m, or one with a '
         "tolerance | **required** |",
@@ -60,8 +64,8 @@ def test_limits_units_and_defaults_stand_in_the_page():
         assert line in page
 
 
-def test_everything_that_an_option_names_stands_in_the_page():
-    page, found = reference_page(), options()
+def test_everything_that_an_option_names_stands_in_the_page(page):
+    found = options()
     assert {"coolant.film_model", "heat.model", "joint.conductance", "bearing_types.NAME.kind"} <= set(found)
     for things in found.values():
         for name in things:
@@ -69,6 +73,6 @@ def test_everything_that_an_option_names_stands_in_the_page():
             assert f"| `{name}` |" in page
 
 
-def test_the_range_of_a_film_of_turning_walls_is_told():
-    (line,) = [line for line in reference_page().splitlines() if line.startswith("| `turning` |")]
+def test_the_range_of_a_film_of_turning_walls_is_told(page):
+    (line,) = [line for line in page.splitlines() if line.startswith("| `turning` |")]
     assert "reynolds 1000 to 100000" in line
