@@ -147,7 +147,6 @@ parameters = {{film_increase = 2}}
 [[effect]]
 effect = "chiller_cycling"
 component = "channel"
-form = "sine"
 parameters = {{period = "900 s"}}
 """
 

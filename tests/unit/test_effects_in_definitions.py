@@ -235,7 +235,6 @@ parameters = {fraction = 0.2}
 [[effect]]
 effect = "chiller_cycling"
 component = "channel"
-form = "sine"
 parameters = {amplitude = "1.5 K", period = "5000 s", phase = "0.4 rad"}
 [[effect]]
 effect = "unrecorded_heat_source"

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spindle_fem.effects.catalogue.ambient_drift import HUMP, RAMP, STEADY, DriftTerm
-from spindle_fem.effects.catalogue.chiller_cycling import PEAK, SHARPNESS, ChillerCyclingTerm
 from spindle_fem.effects.catalogue.coolant_film import TransitionTerm
 from spindle_fem.effects.catalogue.coolant_heating import CoolantHeatingTerm
 from spindle_fem.effects.catalogue.gap_closure import GapClosureTerm
@@ -301,27 +300,6 @@ def test_the_channels_reynolds_number_is_the_reference_ones():
     assert term.law(600.0, {"film_increase": 2.0, "onset_reynolds": 600.0, "width": 50.0}) == pytest.approx(
         2.0
     )
-
-
-def test_waves_have_their_amplitude_and_period():
-    for sawtooth in (False, True):
-        term = ChillerCyclingTerm("t", ("fluid.coolant_inlet",), sawtooth=sawtooth)
-        time = np.linspace(0.0, 600.0, 6001)
-        at = TermContext(
-            time,
-            {},
-            np.zeros((0, time.size), dtype=complex),
-            np.zeros((0, time.size), dtype=complex),
-            {"amplitude": 2.0 + 0j, "period": 600.0 + 0j, "phase": 0j},
-        )
-        wave = term.heat(at)[0].real
-        assert wave.max() == pytest.approx(2.0, rel=1e-5)
-        assert wave.min() == pytest.approx(-2.0, rel=1e-5)
-        assert wave[-1] == pytest.approx(wave[0], abs=1e-9)
-    # The sawtooth is its own Fourier series.
-    terms = np.arange(1, 400)[:, None]
-    series = (SHARPNESS**terms * np.sin(terms * 2.0 * np.pi * time / 600.0) / terms).sum(axis=0)
-    assert wave == pytest.approx(2.0 * series / PEAK, abs=1e-9)
 
 
 def test_coolant_warms_by_what_it_took_before():
