@@ -171,8 +171,12 @@ def _of_any_recording(view: MachineView) -> MachineView:
 
 
 def _require_possible(item: TermParameter, value: float, is_amplitude: bool, where: str) -> None:
-    """Refuse a wrong sign, and a pure amplitude beyond its limits; other limits are those of a search."""
-    pure = is_amplitude and not item.unit
+    """Refuse a wrong sign, and beyond its limits a pure amplitude or a share of either sign.
+
+    Other limits are those of a search.
+    """
+    either_sign = -np.inf < item.low == -item.high
+    pure = not item.unit and (is_amplitude or either_sign)
     low = item.low if pure else 0.0 if item.low >= 0.0 else -np.inf
     high = item.high if pure else np.inf
     if not low <= value <= high:

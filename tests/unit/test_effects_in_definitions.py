@@ -312,6 +312,9 @@ def test_the_physical_limits_of_an_entry_hold_on_every_recording(tmp_path):
         EffectEntry(effect="coolant_bypass", component="channel", parameters={"fraction": 1.4}),
         EffectEntry(effect="sensor_lag", component="SP01", parameters={"time_constant": "-5 s"}),
         EffectEntry(effect="sensor_lag", component="SP09", parameters={"time_constant": "5 s"}),
+        EffectEntry(
+            effect="chiller_cycling", component="channel", parameters={"amplitude": "1 K", "sharpness": 1.2}
+        ),
     ]
     with pytest.raises(FaultsError) as caught:
         effects_on(entries, fast, recording)
@@ -319,3 +322,4 @@ def test_the_physical_limits_of_an_entry_hold_on_every_recording(tmp_path):
     assert "effect[1].parameters.fraction: is 1.4. Allowed: 0 to 0.95." in messages
     assert "effect[2].parameters.time_constant: is -5 s. Allowed: 0 or more s." in messages
     assert any('effect[3].component: "SP09" cannot have sensor_lag' in text for text in messages)
+    assert "effect[4].parameters.sharpness: is 1.2. Allowed: -0.97 to 0.97." in messages
