@@ -1,6 +1,7 @@
 """``spindle-fem run`` and ``report`` on a small machine."""
 
 import json
+from unittest import mock
 
 import meshio
 import pytest
@@ -8,6 +9,8 @@ import xarray as xr
 
 from spindle_fem import load_machine, solve
 from spindle_fem.commands.console import print_run
+from spindle_fem.report import run_outputs
+from spindle_fem.results.run_summary import build_summary
 
 FILES = ("summary.json", "fields.vtu", "result.nc", "report.html", "machine.toml")
 
@@ -105,8 +108,14 @@ def test_run_into_a_folder_of_other_things_is_refused(command, tmp_path):
     assert (tmp_path / "letters.txt").read_text(encoding="utf-8") == "mine"
 
 
-@pytest.mark.render
-def test_a_failed_check_comes_with_one_document_and_where_the_results_are(command, tmp_path, capsys):
+def test_a_failed_check_comes_with_one_document_and_where_the_results_are(
+    command, tmp_path, capsys, monkeypatch
+):
+    def write_summary(result, folder, **settings):
+        (folder / "summary.json").write_text(json.dumps(build_summary(result, 0.0, 0.0)), encoding="utf-8")
+
+    monkeypatch.setattr(run_outputs, "OutputHelpers", mock.MagicMock)
+    monkeypatch.setattr(run_outputs, "write_outputs", write_summary)
     done = command(
         "run", "small_two_start", "--set", "mesh.preset=coarse", "--set", "mesh.order=1",
         "--set", "grease.temperature_limit=21 degC", "-o", tmp_path / "out", "--json",

@@ -82,7 +82,7 @@ def test_plugin_keeps_the_figures_of_a_run(tmp_path):
     command += ["-o", "enable_assertion_pass_hook=true", "-o", "verbosity_assertions=2"]
     command += ["-c", os.devnull, "--rootdir", str(tmp_path)]
     command += ["--figures", str(tmp_path / "figures.json"), str(tmp_path / "test_sample.py")]
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": str(tmp_path / "compiled")}
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     (test,) = read_tests(tmp_path / "figures.json")

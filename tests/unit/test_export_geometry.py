@@ -96,11 +96,12 @@ def test_files_hold_it_all(space, tmp_path):
 
 
 def agrees(fast, drive):
-    """Whether an exported model's readings along a drive are those of simulate; the model."""
+    """Whether an exported model reads along a drive what simulate does; the export, its readings."""
     told = resolved_run(fast, drive, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
-    model = geometry_state_space(fast, "lumped", 4500.0 * RPM).model()
-    assert np.abs(readings_along(model, drive, {0: START}) - told).max() < AGREEMENT
-    return model
+    space = geometry_state_space(fast, "lumped", 4500.0 * RPM)
+    found = readings_along(space.model(), drive, {0: START})
+    assert np.abs(found - told).max() < AGREEMENT
+    return space, found
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +124,7 @@ def turning():
     ids=["near", "cold", "slow", "back_and_forth"],
 )
 def test_a_film_that_turns_turbulent_over_flow_and_inlet_is_that_of_simulate(turning, litres, inlet):
-    model = agrees(turning, driven(flow=litres / 60e3, inlet=inlet))
+    model = agrees(turning, driven(flow=litres / 60e3, inlet=inlet))[0].model()
     # the films bend at one Reynolds number, along no line of flow or inlet
     assert model.header["table_inputs"]["coolant"] == [-1, model.inputs.index("coolant_inlet")]
 
@@ -161,16 +162,17 @@ def test_a_film_follows_the_wall(warmed, drive, tmp_path):
 @needs_compiler
 def test_natural_films_follow_their_walls(fast, drive, tmp_path):
     natural = with_natural_film(fast)
-    model = agrees(natural, drive)
+    space, found = agrees(natural, drive)
+    model = space.model()
     inputs = {"speed": 3000.0 * RPM, "ambient": 23.0, "coolant_inlet": 17.0}
     model.settle(inputs)
     settled = model.read(inputs)
     model.step(3600.0, inputs)
     assert model.read(inputs) == pytest.approx(settled, abs=1e-6)
     path = tmp_path / "model.c"
-    file_writer(path)(geometry_state_space(natural, "lumped", 4500.0 * RPM), path)
+    file_writer(path)(space, path)
     in_c = c_readings_along(tmp_path, "lumped", model, drive, START)
-    np.testing.assert_allclose(in_c, readings_along(model, drive, {0: START}), rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(in_c, found, rtol=0.0, atol=1e-7)
 
 
 def test_the_range_holds_a_recording(fast, spec, monkeypatch):
