@@ -15,6 +15,7 @@ from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked
 from spindle_fem.inference.hypothesis_fit import Fit, amplitude_name
 from spindle_fem.inference.like_sets import (
+    are_alike,
     as_one,
     free_in_time,
     holds,
@@ -331,10 +332,13 @@ def judge(
     known_as_one = overlapping or {}
     # Which bearing of a set it is does not matter for the decision; the best represents all.
     alike, rivals = as_one(ranked, known_as_one)
+    # What held-out readings say of a rival is asked by itself.
+    before = as_one(list(fitted.values()), known_as_one)
+    likely = [i.fit for i in (before[0], *before[1]) if i.probability >= tuned.NEAR_PROBABILITY]
     near = [
         item
         for item in rivals
-        if item.probability >= tuned.NEAR_PROBABILITY
+        if any(are_alike(item.fit, fit, known_as_one) for fit in likely)
         and may_stand_for(item.fit, chosen.fit, known_as_one)
         and not leaves_unnamed(item.fit, chosen.fit, known_as_one)
         and _told_by_readings(chosen.best, item.best, coarseness) < tuned.LEAST_HELDOUT_GAIN
