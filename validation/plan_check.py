@@ -8,7 +8,7 @@ table, leaves ``RESULTS/plan_check.json``.
 *Told apart*: the plan says that the concealed effect is seen and distinguished from every other; the
 diagnosis must name it (``exactly``: and nothing beside it). *Not told apart*: the plan says that it is not
 seen, or not told from something; the diagnosis must not claim one set alone, with probability
-``CLAIMED`` (``nothing_wrong_claimed``: not a wrong one).
+``tuned.DECIDED`` (``nothing_wrong_claimed``: not a wrong one).
 """
 
 import argparse
@@ -24,8 +24,6 @@ from .open_examples import MESH, accepted_sets, examples
 from .score import first_right, matches, ranked_sets
 
 MACHINE = "recorded_spindle"
-# Probability of a set from which a diagnosis claims it.
-CLAIMED = 0.75
 
 
 def cases(results: Path, study: Path | None, recordings: Path) -> Iterator[tuple[str, Path, str, Path]]:
@@ -75,6 +73,8 @@ def multiple_of(item: Any, effect: dict[str, Any]) -> float:
 
 def held_against(planned: Any, answer: dict[str, Any], diagnosis: dict[str, Any]) -> dict[str, Any] | None:
     """Prediction of the plan about the concealed effect of one case, and outcome of the diagnosis."""
+    from spindle_fem.inference import tuned
+
     effect = concealed(answer)
     components = effect.get("acceptable_components", effect.get("components", effect["component"]))
     components = [components] if isinstance(components, str) else components
@@ -102,7 +102,7 @@ def held_against(planned: Any, answer: dict[str, Any], diagnosis: dict[str, Any]
     sets = ranked_sets(diagnosis)
     found, probability = sets[0]
     right = first_right({"acceptable_sets": [[_listed(o) for o in g] for g in accepted_sets(answer)]}, found)
-    decided = diagnosis["verdict"] not in ("ambiguous", "unexplained") and probability >= CLAIMED
+    decided = diagnosis["verdict"] not in ("ambiguous", "unexplained") and probability >= tuned.DECIDED
     names = [f"{plan.hypotheticals[j].effect}@{plan.hypotheticals[j].component}" for j in confused]
     instead = [f"{f['effect']}@{f['component']}" for f in found]
     named = any(
