@@ -34,6 +34,39 @@ def test_a_third_beside_two_that_fit_within_the_errors_is_less_probable_where_he
     assert odds(0.0, more) == pytest.approx(2.0)
 
 
+def test_a_verdict_doubts_thirds_of_a_machine_that_is_drawn():
+    nothing = replace(hypothesis(misfit=2000.0), heldout=900.0)
+    pair = replace(hypothesis(PRELOAD, CHURNING, misfit=400.0), heldout=500.0)
+    triple = replace(hypothesis(PRELOAD, CHURNING, OFFSET, misfit=380.0), heldout=500.0)
+
+    def likelier(coarseness):
+        """The triple, where it would be e times as probable as the pair."""
+        three, two = (
+            next(i.probability for i in rank([nothing, pair, triple], coarseness) if len(i.fit.keys) == size)
+            for size in (3, 2)
+        )
+        return replace(triple, log_prior=1.0 - float(np.log(three / two)))
+
+    for coarseness, members in ((1.0, 2), (1.1, 3)):
+        found = verdict(nothing, pair, likelier(coarseness), calibrated=True, coarseness=coarseness)
+        assert len(found.chosen.fit.keys) == members
+
+
+def test_a_rival_is_one_by_what_fitted_readings_say_of_it():
+    nothing, best = replace(hypothesis(misfit=1400.0), heldout=900.0), hypothesis(PRELOAD, misfit=400.0)
+    best = replace(best, heldout=500.0)
+
+    def said(share):
+        """Of a set that reads alike, so probable by fitted readings, three times as probable by all."""
+        gain = 2.0 * tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.log(3.0))
+        rival = hypothesis(CHURNING, misfit=400.0, log_prior=float(np.log(share)))
+        return verdict(nothing, best, replace(rival, heldout=500.0 - gain), apart=lambda one, other: 0.0)
+
+    least = tuned.NEAR_PROBABILITY
+    assert (said(1.2 * least).verdict, said(1.2 * least).reason) == ("ambiguous", NEAR_REASON)
+    assert said(0.8 * least).verdict == "missing_physics"
+
+
 def test_rivals_at_places_that_count_as_one_are_one_rival():
     places = ("front_bearings", "F1", "F2")
     group = dict.fromkeys(places, frozenset(places))
