@@ -96,6 +96,11 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
 
     @property
+    def coarseness(self) -> float:
+        """How many times less gains count than on a machine that is drawn."""
+        return _coarseness(self.predictor.is_network)
+
+    @property
     def stated_fit(self) -> Fit:
         """The chosen set as it is stated: with hidden states from all readings, else as it was fitted."""
         return self.followed.fit if self.followed and self.followed.states else self.final
@@ -175,7 +180,7 @@ def diagnose_recordings(
     found = [replace(h, expected_misfit=h.fit.reduced_misfit) for h in run_search(search)]
     clock.lap("search")
     progress("diagnosis: final fits")
-    coarseness = tuned.NETWORK_COARSENESS if machine.is_network else 1.0
+    coarseness = _coarseness(machine.is_network)
     best = rank(found, coarseness)[0].best
     slow = slow_error_of(problem, best.fit)
     trials = len({(c.effect, c.component) for c in candidates})
@@ -267,6 +272,11 @@ def diagnose_recordings(
         followed,
         notes,
     )
+
+
+def _coarseness(is_network: bool) -> float:
+    """As :func:`tempered` takes it."""
+    return tuned.NETWORK_COARSENESS if is_network else 1.0
 
 
 def _calibrated(

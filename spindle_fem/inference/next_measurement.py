@@ -180,7 +180,8 @@ def rivals_of(diagnosis: Diagnosis) -> tuple[list[Ranked], Array, bool]:
     found = [judgement.chosen, *judgement.alternatives][:MOST_HYPOTHESES]
     decided = len(found) < 2
     if decided:
-        others = [item for item in rank(diagnosis.hypotheses) if item.fit.keys != found[0].fit.keys]
+        ranked = rank(diagnosis.hypotheses, diagnosis.coarseness)
+        others = [item for item in ranked if item.fit.keys != found[0].fit.keys]
         # The same set plus one effect is not a different explanation, and "nothing missing" is excluded.
         others.sort(key=lambda item: (item.fit.keys > found[0].fit.keys, not item.fit.candidates))
         found += others[:1]

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.findings import channel_noise
 from spindle_fem.inference.hypothesis_fit import Fit
@@ -254,8 +253,7 @@ def _heat(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _sets(diagnosis: Diagnosis) -> dict[str, Any]:
-    coarseness = tuned.NETWORK_COARSENESS if diagnosis.predictor.is_network else 1.0
-    ranked = rank(diagnosis.hypotheses, coarseness)
+    ranked = rank(diagnosis.hypotheses, diagnosis.coarseness)
     share = 1.0 - diagnosis.judgement.other
     chosen = diagnosis.judgement.chosen.fit.keys
     return {
