@@ -20,7 +20,7 @@ from .generate import HEAVY, draw_stable, effect_answer, effects_set, judge, pla
 from .identify import Study
 from .recorder import Logger, Noise, record
 from .reduction import ReducedSpindle, load_reduced
-from .rough import GRID, AsMounted, deviating_machine, draw_channels, draw_mounting
+from .rough import GRID, AsMounted, deviating_machine, draw_channels, draw_mounting, what_is_open
 from .stepping import draw_as_built, run
 from .study_writer import study_options, write_study
 
@@ -146,12 +146,13 @@ def _attempt(
     known = None
     if wanted:
         calibration = plans[1] if len(plans) > 1 else None
-        study = Study(model, plans[0], calibration, as_built, judged_by, (mounted,), channels)
+        told = (model, plans[0], calibration, as_built, judged_by, (mounted,), channels)
+        study = Study(*told)
         for _ in range(20):
             effects, _ = draw_stable(wanted, study, paths[0], plans[0], rng)
             if read_channels(effects, channels):
                 break
-        known = what_is_known(study, effects) if identified else None
+        known = what_is_known(Study(*told, what_is_open()), effects) if identified else None
     readings = run(
         model, plans[0].drive, as_built, (mounted, *(e.machine for e in effects if e.machine))
     ).readings

@@ -5,6 +5,7 @@ Shapes come from a pool of finite-volume models with deviating dimensions
 the heat over speed are drawn for every case.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,6 +22,8 @@ UPPER_AREA = 0.12
 TOPS = ("housing_middle_top", "housing_front_top", "housing_rear_top")
 # Within 0.02 K of the finer grid of :func:`validation.reduction.load_reduced`, at an eighth of its cost.
 GRID = {"sectors": 16, "size": 150, "draws": 4}
+# Standard deviation of a wave of the heat over speed, and of what is drawn of the mounting, zeros counted.
+SHAPE, TOOL_KG, BRACKET_W_K, TOP_K, BALL = 0.03, 1.4, 0.55, 1.2, 0.1
 
 
 def maybe(rng: np.random.Generator, share: float, value: float) -> float:
@@ -114,7 +117,7 @@ def draw_mounting(rng: np.random.Generator) -> AsMounted:
     """Draw the additions to one machine, and the shape of its heat over speed."""
 
     def waves() -> tuple[tuple[float, float], ...]:
-        return tuple((float(rng.normal(0.0, 0.03)), float(rng.uniform(0.0, 2.0 * np.pi))) for _ in range(2))
+        return tuple((float(rng.normal(0.0, SHAPE)), float(rng.uniform(0.0, 2.0 * np.pi))) for _ in range(2))
 
     return AsMounted(
         maybe(rng, 0.4, rng.uniform(0.8, 3.5)),
@@ -122,6 +125,28 @@ def draw_mounting(rng: np.random.Generator) -> AsMounted:
         maybe(rng, 0.5, rng.uniform(0.8, 2.5)),
         maybe(rng, 0.5, rng.uniform(0.08, 0.2)),
         {"F": waves(), "R": waves()} if rng.random() < 0.85 else {},
+    )
+
+
+def what_is_open() -> tuple[Callable[[float], Law], ...]:
+    """Mounting and shapes of the heat as directions with one standard deviation each.
+
+    An effect that these and the uncertain parameters take up cannot be known from the readings of a machine
+    of which nothing else is told.
+    """
+
+    def wave(where: str, turns: int, phase: float) -> Callable[[float], Law]:
+        still = ((0.0, 0.0),) * (turns - 1)
+        size = SHAPE / np.sqrt(2.0)
+        return lambda x: AsMounted(shape={where: (*still, (size * x, phase))})
+
+    waves = [wave(w, turns, phase) for w in "FR" for turns in (1, 2) for phase in (0.0, np.pi / 2.0)]
+    return (
+        *waves,
+        lambda x: AsMounted(tool_kg=TOOL_KG * x),
+        lambda x: AsMounted(bracket=BRACKET_W_K * x),
+        lambda x: AsMounted(top=TOP_K * x),
+        lambda x: AsMounted(ball=BALL * x),
     )
 
 
