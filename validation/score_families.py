@@ -108,6 +108,7 @@ def score_row(answer: dict[str, Any], diagnosis: dict[str, Any], folder: Path) -
         "true_verdict": answer["true_verdict"],
         "consistent": consistent,
         "detectable": consistent or answer["detectable"],
+        "clear": bool(answer.get("clear")),
         "undecidable": answer["verdict"] == "ambiguous",
         "ratio": (answer.get("identifiability") or {}).get("ratio"),
         "right": (diagnosis["verdict"] == "consistent") if consistent else in_place and verdict_right,
@@ -147,6 +148,7 @@ def failed_row(answer: dict[str, Any]) -> dict[str, Any]:
         "true_verdict": answer["true_verdict"],
         "consistent": consistent,
         "detectable": consistent or answer["detectable"],
+        "clear": bool(answer.get("clear")),
         "undecidable": False,
         "right": False,
         "set_first": False,
@@ -184,6 +186,7 @@ def figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "cases": len(rows),
         "failed": sum(r["failed"] for r in rows),
         "right": share([r for r in rows if r["detectable"]], "right"),
+        "clear_right": share([r for r in shown if r.get("clear")], "right"),
         "set_first": share(shown, "set_first"),
         "within_three": share(shown, "within_three"),
         "flagged_of_consistent": share([r for r in rows if r["consistent"]], "flagged"),
@@ -254,7 +257,8 @@ def main(arguments: list[str] | None = None) -> None:
             f"   truth: {', '.join(row['truth']) or '(nothing)'}"
             + (f"   F1 {row['states_f1']:.2f}" if row.get("states_f1") is not None else "")
         )
-    columns = ("right", "within_three", "flagged_of_consistent", "intervals_hold", "confident_wrong")
+    columns = ("right", "clear_right", "within_three", "flagged_of_consistent")
+    columns += ("intervals_hold", "confident_wrong")
     print(f"\n{'':34s}" + "".join(f"{c:>24s}" for c in columns) + f"{'F1':>8s}")
     for name, part in {"all": found["all"], **found["by_family"], **found["by_machine"]}.items():
         f1 = part["states_f1"]["median"]

@@ -219,7 +219,9 @@ def diagnose_recordings(
     fitted_without(unchanged, own)
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
     readings = FollowedReadings(final, plain, lambda fit: inferred_states(search, final, fit))
-    refitted = with_own_noise(plain, readings.residuals, readings.kept(refitted))
+    # Where likelihoods hold, they weigh held-out readings too; on a coarse machine only their errors tell.
+    kept = readings.kept(refitted) if machine.is_network else refitted
+    refitted = with_own_noise(plain, readings.residuals, kept)
     refitted = [replace(h, heldout=readings.heldout_misfit(h.fit)) for h in refitted]
     clock.lap("final fits")
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())

@@ -175,7 +175,8 @@ CHANCE_DIVISOR, CANDIDATES_A_TRIAL = 2.2, 64.0
 # Amplitudes from this share of their usual size up to it are as likely in every decade. What is less than
 # this many of its own standard deviations counts as that large: a small fitted size is no evidence.
 SMALLEST_SIZE, SEEN_FROM = 0.01, 2.0
-# A set whose error on held-out readings is this many times that of some of its effects alone is given up.
+# A set of a network whose error on held-out readings is this many times that of some of its effects alone is
+# given up.
 WORSE_HELDOUT = 1.05
 # Gain in likelihood of held-out readings that a set needs to be named at all, as a gain that counts: twenty
 # to one; of a machine with geometry with its odds by fitted readings. (Six effects of seeds 91, 101 and 171
