@@ -307,7 +307,8 @@ class Problem:
                 if trial is not None and trial.cost < point.cost - 1e-9:
                     gain = point.cost - trial.cost
                     point = trial
-                    damping = max(damping / 10.0, 1e-6)
+                    # What had to be damped more has to be damped as much in the next step.
+                    damping = max(damping / 10.0, 1e-6) if refused is None else damping
                     break
                 if largest < 1e-6:
                     break
