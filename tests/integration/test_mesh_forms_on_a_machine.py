@@ -46,21 +46,24 @@ def test_the_matrices_of_a_machine_are_the_forms(mesh, order):
     )
 
     loaded = load_into_skfem(mesh, order)
-    matrix = stored = 0.0
-    for index, part in enumerate(parts):
-        basis = loaded.basis.with_elements(np.flatnonzero(mesh.part_of_element == index))
-        matrix = matrix + conductivity[part] * asm(forms.conduction, basis)
-        stored = stored + capacity[part] * asm(forms.capacity, basis)
-    for name, value in films.items():
-        matrix = matrix + asm(weighted(forms.film), loaded.facet_basis(mesh.surfaces[name]), h=value[:, None])
-    for name, value in joints.items():
-        joint = mesh.joints[name]
-        sides = [loaded.facet_basis(facets) for facets in (joint.facets_a, joint.facets_b)]
-        matrix = matrix + asm(weighted(forms.joint), sides, sides, h=value[:, None])
+    of_elements = [
+        np.array([by[part] for part in parts])[mesh.part_of_element] for by in (conductivity, capacity)
+    ]
+    matrix, stored = (
+        asm(weighted(form), loaded.basis, h=value[:, None])
+        for form, value in zip((forms.conduction, forms.capacity), of_elements, strict=True)
+    )
+    wetted = loaded.facet_basis(np.vstack([mesh.surfaces[name] for name in films]))
+    matrix = matrix + asm(weighted(forms.film), wetted, h=np.concatenate(list(films.values()))[:, None])
+    facets = zip(*((mesh.joints[name].facets_a, mesh.joints[name].facets_b) for name in joints), strict=True)
+    sides = [loaded.facet_basis(np.vstack(side)) for side in facets]
+    matrix = matrix + asm(
+        weighted(forms.joint), sides, sides, h=np.concatenate(list(joints.values()))[:, None]
+    )
     assert difference(assemble_system(problem).matrix, loaded.in_our_order(matrix)) < ROUND_OFF
     assert difference(assemble_capacity(problem)[0], loaded.in_our_order(stored)) < ROUND_OFF
 
 
 def weighted(form):
-    """A form with a coefficient that is constant on each facet."""
+    """A form with a coefficient that is constant on each element or facet."""
     return type(form)(lambda u, v, w: w.h * form.form(u, v, w))
