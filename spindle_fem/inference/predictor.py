@@ -214,12 +214,12 @@ class Predictor:
             for index, (_, least, most) in enumerate(items)
         ]
 
-    def gaps(self) -> list[str]:
-        """Names of what may have happened within gaps."""
+    def gaps(self) -> list[tuple[str, float]]:
+        """What may have happened within gaps: name, and one standard deviation."""
         return [
-            f"{GAP_PREFIX}{number}.{index}"
+            (f"{GAP_PREFIX}{number}.{index}", item.sigma)
             for number, items in enumerate(self._hidden)
-            for index in range(len(items))
+            for index, item in enumerate(items)
         ]
 
     def gap_intervals(self, number: int) -> tuple[tuple[float, float], ...]:

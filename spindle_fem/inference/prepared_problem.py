@@ -94,8 +94,7 @@ def start_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:
     starts = [coordinate_of(prior, THETA_BOUND) for prior in predictor.starts()]
     jumps = [_jump(name, least, most) for name, least, most in predictor.jumps()]
     gaps = [
-        Coordinate(name, 0.0, tuned.GAP_SIGMA, False, -1.0 / tuned.GAP_SIGMA, 1.0 / tuned.GAP_SIGMA)
-        for name in predictor.gaps()
+        Coordinate(name, 0.0, sigma, False, -1.0 / sigma, 1.0 / sigma) for name, sigma in predictor.gaps()
     ]
     own = [_direction(item) for item in predictor.misdescribed if item.recording is not None]
     return (*starts, *jumps, *gaps, *own)

@@ -88,12 +88,15 @@ class Hidden:
         Bearing set, or input temperature.
     size : float
         1, or change of the input over the gap [K].
+    sigma : float
+        How much of the size may have been: one standard deviation.
     """
 
     begin: float
     end: float
     what: str
     size: float
+    sigma: float = tuned.GAP_SIGMA
 
 
 def hidden_in(
@@ -108,7 +111,10 @@ def hidden_in(
         Bearing sets: friction of each, as a share of the highest that it gives. Input temperatures that
         are others after a gap come on top, as a share of their change.
     """
-    found = [Hidden(begin, end, name, 1.0) for begin, end in pieces for name in sets]
+    found = []
+    for begin, end in pieces:
+        sigma = max(tuned.GAP_SIGMA, spread_within(recording, begin, end))
+        found += [Hidden(begin, end, name, 1.0, sigma) for name in sets]
     for name in WARMTH:
         if name not in recording.input_names:
             continue
@@ -119,6 +125,29 @@ def hidden_in(
                 found.append(Hidden(begin, end, name, float(after - before)))
         found += _between_rows(recording, name)
     return tuple(found)
+
+
+def spread_within(recording: Recording, begin: float, end: float) -> float:
+    """How far the speed strays from what is held over a gap, as a share of the highest.
+
+    Root mean square over the rest of the recording, amid a piece of the gap: a machine that starts and stops
+    every few minutes may have done so unseen, one that runs for hours hardly has.
+    """
+    if "speed" not in recording.input_names:
+        return 0.0
+    times = recording.times
+    row = int(np.searchsorted(times, begin + 1e-6))
+    length, amid = times[row] - times[row - 1], 0.5 * (begin + end) - times[row - 1]
+    starts = times[times + length <= times[-1]]
+    # Windows with a gap of their own know nothing of it.
+    gaps = times[:-1][np.diff(times) > GAP_STEPS * np.median(np.diff(times))]
+    starts = starts[np.searchsorted(gaps, starts) == np.searchsorted(gaps, starts + length)]
+    if not starts.size:
+        return 0.0
+    speed = np.abs(recording.input_at("speed", np.concatenate((starts, starts + length, starts + amid))))
+    before, after, between = np.split(speed, 3)
+    strayed = between - np.where(amid < 0.5 * length, before, after)
+    return float(np.sqrt(np.mean(strayed**2)) / max(speed.max(), 1e-9))
 
 
 def _between_rows(recording: Recording, name: str) -> list[Hidden]:

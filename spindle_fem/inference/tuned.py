@@ -31,7 +31,7 @@ DISPLACEMENT_SLOW_SIGMA, DISPLACEMENT_SLOW_SIGMAS = 0.3, (0.3, 0.7, 1.5, 3.0)
 SLOW_SIGMAS = (0.02, 0.03, 0.045, 0.065, 0.09, 0.13)
 SLOW_TIMES = (600.0, 1200.0, 2400.0, 4800.0)
 # Friction within a gap beyond what the inputs beside it say, one standard deviation as a share of the
-# highest: most machines go on as before.
+# highest, at least (more where the speed changes as often as gaps last): most machines go on as before.
 GAP_SIGMA = 0.3
 # Gaps shorter than this [s] and smaller changes of an input temperature over one [K] move no reading by its
 # noise; length of a piece of a gap [s], and the most pieces: each is a further coordinate of every fit.

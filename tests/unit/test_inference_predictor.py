@@ -306,7 +306,7 @@ def test_what_happens_in_a_gap_is_open_for_each_set_and_for_inputs_that_changed(
     assert pieces[0][0] == 1500.0
     assert pieces[-1][1] == 2050.0
     sets = len(predictor.fast.spec.bearing_set)
-    names = own.gaps()
+    names = [name for name, _ in own.gaps()]
     assert len(names) == (sets + 1) * len(pieces)
     still = own.predict(0, {}).temperature
     change = {name: own.predict(0, {name: 1.0}).temperature - still for name in names}
