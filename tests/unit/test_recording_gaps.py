@@ -1,0 +1,45 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.recording_gaps import hidden_in, spread_within
+
+minutes = 60.0 * np.arange(0.0, 401.0)
+
+
+def recorded(speed, gap=(12000.0, 13200.0)):
+    """A recording of a speed over the time, rows every minute but within a gap."""
+    begin, end = gap
+    times = minutes[(minutes <= begin) | (minutes >= end)]
+    return SimpleNamespace(times=times, input_names=("speed",), input_at=lambda name, t: speed(np.asarray(t)))
+
+
+def on_and_off(t):
+    """Ten minutes at 3000 rpm, ten at rest."""
+    return 3000.0 * (np.floor(t / 600.0) % 2 == 0)
+
+
+def test_a_machine_that_starts_and_stops_may_have_done_so_in_a_gap():
+    """A quarter of a period after its beginning half of all windows have changed, by all there is."""
+    recording = recorded(on_and_off)
+    assert spread_within(recording, 12240.0, 12360.0) == pytest.approx(np.sqrt(0.5), abs=0.01)
+    assert spread_within(recording, 12000.0, 12000.0) == 0.0
+
+
+def test_a_machine_that_runs_on_leaves_what_is_always_open():
+    steady = recorded(lambda t: np.full(t.shape, 2000.0))
+    assert spread_within(steady, 12240.0, 12360.0) == 0.0
+    (quiet,) = hidden_in(steady, [(12240.0, 12360.0)], ["front"])
+    (restless,) = hidden_in(recorded(on_and_off), [(12240.0, 12360.0)], ["front"])
+    assert (quiet.sigma, restless.sigma) == (tuned.GAP_SIGMA, pytest.approx(np.sqrt(0.5), abs=0.01))
+
+
+def test_windows_with_a_gap_of_their_own_and_speeds_nobody_recorded_tell_nothing():
+    """A speed that changed only within one gap says nothing of what happens in the other."""
+    once = recorded(lambda t: 3000.0 * (t > 12100.0))
+    kept = once.times[(once.times <= 3000.0) | (once.times >= 4200.0)]
+    assert spread_within(SimpleNamespace(**vars(once) | {"times": kept}), 3000.0, 3600.0) == 0.0
+    unread = SimpleNamespace(times=minutes, input_names=())
+    assert spread_within(unread, 60.0, 120.0) == 0.0
