@@ -1,7 +1,8 @@
 """How often a first set is right, given its evidence (``python -m validation.reliability STUDY=RESULTS``).
 
 Fits what :mod:`spindle_fem.inference.reliability` states, by maximum likelihood
-over diagnoses of concealed recordings that named something of the catalogue.
+over diagnoses of concealed recordings that named something of the catalogue,
+where nothing was concealed as well.
 """
 
 import argparse
@@ -23,7 +24,6 @@ Array = NDArray[np.float64]
 NAMES = (
     "constant",
     "by the logit of evidence",
-    "by each effect beyond two",
     "by the last effect's share",
     "by what a larger set gains",
 )
@@ -41,7 +41,7 @@ def experience(study: Path, results: Path) -> tuple[Array, Array]:
 
     Returns
     -------
-    features : (n, 5) ndarray
+    features : (n, 4) ndarray
     right : (n,) ndarray
         0 or 1.
     """
@@ -52,20 +52,20 @@ def experience(study: Path, results: Path) -> tuple[Array, Array]:
         if not found.exists() or any(e.get("outside_catalogue") for e in answer["effects"]):
             continue
         diagnosis = json.loads(found.read_text(encoding="utf-8"))
-        if answer["effects"] and diagnosis["findings"]:
+        if diagnosis["findings"]:
             evidence = diagnosis.get("evidence")
             if evidence is None:
                 raise SystemExit(f"{found}: says nothing of evidence. Diagnose the study anew.")
             probability, share, more = (
                 evidence[key] for key in ("probability", "share_of_last", "gain_of_more")
             )
-            rows.append(features(probability, len(diagnosis["findings"]), share, more))
+            rows.append(features(probability, share, more))
             right.append(float(first_right(answer, diagnosis["findings"])))
     return np.array(rows).reshape(-1, len(NAMES)), np.array(right)
 
 
 def fitted(rows: Array, right: Array) -> Array:
-    """Coefficients of the logistic regression, (5,)."""
+    """Coefficients of the logistic regression, (4,)."""
 
     def cost(coefficients: Array) -> float:
         score = rows @ coefficients

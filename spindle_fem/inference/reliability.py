@@ -44,43 +44,35 @@ def gain_of_more(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float:
     return max(0.0, 0.5 * (chosen.misfit - min(larger))) if larger else 0.0
 
 
-def features(probability: float, size: int, share: float, more: float) -> list[float]:
+def features(probability: float, share: float, more: float) -> list[float]:
     """Features that the coefficients of experience multiply to give a set's reliability, first a constant.
 
     Parameters as for :func:`reliable`.
 
-    >>> features(0.5, 3, 0.1, 9.0)
-    [1.0, 0.0, 1.0, -1.0, 1.0]
+    >>> features(0.5, 0.1, 9.0)
+    [1.0, 0.0, -1.0, 1.0]
     """
     given = float(logit(np.clip(probability, 1.0 - tuned.LARGEST_EVIDENCE, tuned.LARGEST_EVIDENCE)))
     by_share = float(np.log10(max(share, tuned.SMALLEST_SHARE)))
-    return [1.0, given, float(max(0, size - 2)), by_share, float(np.log10(1.0 + more))]
+    return [1.0, given, by_share, float(np.log10(1.0 + more))]
 
 
-def reliable(probability: float, size: int, share: float, more: float = 0.0) -> float:
+def reliable(probability: float, share: float, more: float = 0.0) -> float:
     """Probability of a set, no larger than experience has it.
 
     Parameters
     ----------
     probability : float
         That evidence gives.
-    size : int
-        Effects of the set.
     share : float
         :func:`share_of_last`.
     more : float
         :func:`gain_of_more`.
 
-    >>> round(reliable(0.9999, 1, 1.0), 2), round(reliable(0.9999, 2, 0.03), 2), reliable(0.4, 1, 1.0)
-    (0.97, 0.95, 0.4)
-    >>> round(reliable(0.9999, 1, 1.0, more=40.0), 2)
-    0.9
+    >>> round(reliable(0.9999, 1.0), 2), round(reliable(0.9999, 0.03), 2), reliable(0.4, 1.0)
+    (0.95, 0.58, 0.4)
+    >>> round(reliable(0.9999, 1.0, more=40.0), 2)
+    0.83
     """
-    coefficients = (
-        tuned.RELIABILITY_CONSTANT,
-        tuned.BY_LOGIT,
-        tuned.BY_FURTHER,
-        tuned.BY_SHARE,
-        tuned.BY_MORE,
-    )
-    return min(probability, float(expit(np.dot(coefficients, features(probability, size, share, more)))))
+    coefficients = (tuned.RELIABILITY_CONSTANT, tuned.BY_LOGIT, tuned.BY_SHARE, tuned.BY_MORE)
+    return min(probability, float(expit(np.dot(coefficients, features(probability, share, more)))))

@@ -346,9 +346,8 @@ def judge(
     ]
     evidence = alike.probability
     share = share_of_last(hypotheses, chosen.best)
-    size = len(chosen.fit.candidates)
     more = gain_of_more(hypotheses, chosen.best)
-    known = (1.0 - nothing) * (1.0 - inexact) * reliable(evidence, size, share, more) / evidence
+    known = (1.0 - nothing) * (1.0 - inexact) * reliable(evidence, share, more) / evidence
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
         for item in rivals

@@ -398,7 +398,7 @@ def test_a_fit_that_stays_above_the_noise_leaves_room_for_something_else():
     assert found.other > 0.1
     assert found.chosen.probability <= 1.0 - found.other + 1e-12
     good = verdict(hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=400.0, reduced=1.0))
-    assert good.other == pytest.approx(1.0 - reliable(good.evidence, 1, 1.0))
+    assert good.other == pytest.approx(1.0 - reliable(good.evidence, 1.0))
     assert found.chosen.probability < good.chosen.probability
     nearly = verdict(hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=440.0, reduced=1.1))
     assert good.other < nearly.other < found.other
@@ -445,14 +445,13 @@ def test_a_small_last_effect_makes_a_set_less_reliable():
         0.5 * (one.fit.misfit_with_prior - pair.fit.misfit_with_prior)
     )
     assert gain_of_more([null, one, other, pair], pair) == 0.0
-    assert reliable(0.999, 1, 1.0, more=50.0) < reliable(0.999, 1, 1.0)
-    assert reliable(0.999, 2, 0.05) < reliable(0.999, 2, 0.5) < reliable(0.999, 1, 1.0) < 0.999
-    assert reliable(0.999, 3, 0.5) < reliable(0.999, 2, 0.5)
+    assert reliable(0.999, 1.0, more=50.0) < reliable(0.999, 1.0)
+    assert reliable(0.999, 0.05) < reliable(0.999, 0.5) < reliable(0.999, 1.0) < 0.999
 
 
 @pytest.mark.parametrize("probability", [0.02, 0.3, 0.6, 0.9, 0.99, 1.0])
 def test_experience_only_lowers_what_evidence_says(probability):
-    found = [reliable(probability, size, share) for size in (1, 2, 3) for share in (0.0, 0.1, 1.0)]
+    found = [reliable(probability, share) for share in (0.0, 0.1, 1.0)]
     assert all(0.0 < value <= probability for value in found)
 
 
@@ -465,4 +464,4 @@ def test_what_experience_takes_goes_to_something_else():
     )
     stated = [found.chosen.probability, *(item.probability for item in found.alternatives), found.other]
     assert sum(stated) == pytest.approx(1.0)
-    assert found.chosen.probability == pytest.approx(reliable(found.evidence, 1, 1.0))
+    assert found.chosen.probability == pytest.approx(reliable(found.evidence, 1.0))

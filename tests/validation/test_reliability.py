@@ -13,12 +13,11 @@ from validation.reliability import experience, fitted, log_loss
 
 def test_the_regression_finds_what_made_the_experience():
     generator = np.random.default_rng(1)
-    true = np.array([0.5, 0.3, -1.2, 0.9, -0.8])
+    true = np.array([0.5, 0.3, 0.9, -0.8])
     rows = np.array(
         [
-            features(float(p), int(size), float(share), float(more))
-            for size, p, share, more in zip(
-                generator.integers(1, 4, 20_000),
+            features(float(p), float(share), float(more))
+            for p, share, more in zip(
                 expit(generator.uniform(-2.0, 9.0, 20_000)),
                 10.0 ** generator.uniform(-2.5, 0.0, 20_000),
                 10.0 ** generator.uniform(0.0, 2.0, 20_000) - 1.0,
@@ -32,10 +31,10 @@ def test_the_regression_finds_what_made_the_experience():
 
 
 def test_experience_never_raises_what_evidence_says():
-    own = [tuned.RELIABILITY_CONSTANT, tuned.BY_LOGIT, tuned.BY_FURTHER, tuned.BY_SHARE, tuned.BY_MORE]
-    for probability, size, share, more in ((0.99, 1, 1.0, 30.0), (0.999, 2, 0.04, 0.0), (1.0, 3, 0.0, 2.0)):
-        seen = expit(np.dot(own, features(probability, size, share, more)))
-        assert reliable(probability, size, share, more) == pytest.approx(min(probability, seen))
+    own = [tuned.RELIABILITY_CONSTANT, tuned.BY_LOGIT, tuned.BY_SHARE, tuned.BY_MORE]
+    for probability, share, more in ((0.99, 1.0, 30.0), (0.999, 0.04, 0.0), (1.0, 0.0, 2.0)):
+        seen = expit(np.dot(own, features(probability, share, more)))
+        assert reliable(probability, share, more) == pytest.approx(min(probability, seen))
 
 
 def test_only_diagnoses_that_name_something_count(tmp_path):
@@ -51,7 +50,7 @@ def test_only_diagnoses_that_name_something_count(tmp_path):
         ("e", wanted, [finding], True),
     ):
         concealed = [{**e, "outside_catalogue": foreign} for e in effects]
-        answer = {"case": name, "effects": concealed, "acceptable_sets": [wanted]}
+        answer = {"case": name, "effects": concealed, "acceptable_sets": [wanted] if effects else []}
         (study / "answers" / f"{name}.json").write_text(json.dumps(answer))
         (results / name).mkdir(parents=True)
         said = {
@@ -60,8 +59,8 @@ def test_only_diagnoses_that_name_something_count(tmp_path):
         }
         (results / name / "diagnosis.json").write_text(json.dumps(said))
     rows, right = experience(study, results)
-    assert rows.shape == (2, 5)
-    assert right.tolist() == [1.0, 0.0]
+    assert rows.shape == (3, 4)
+    assert right.tolist() == [1.0, 0.0, 0.0]
     (results / "a" / "diagnosis.json").write_text(json.dumps({"findings": [finding]}))
     with pytest.raises(SystemExit, match=r"a/diagnosis.json: says nothing of evidence"):
         experience(study, results)
