@@ -38,6 +38,11 @@ def small():
 
 
 @pytest.fixture(scope="session")
+def small_result(small):
+    return solve_prepared(small)
+
+
+@pytest.fixture(scope="session")
 def small_fast(small):
     """Its reduced model, which the cache keeps between workers and runs."""
     return fast_spindle(reduced_model_of(small.spec), small.spec)

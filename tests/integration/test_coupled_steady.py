@@ -43,10 +43,10 @@ def test_coolant_takes_what_its_temperature_rise_says(recorded_result):
     assert coolant.mean_film_coefficient == pytest.approx(243.2, rel=1e-3)
 
 
-def test_a_solution_is_not_taken_while_its_equations_are_not_solved(recorded, monkeypatch):
+def test_a_solution_is_not_taken_while_its_equations_are_not_solved(small, monkeypatch):
     """The last linear solve may end early where the loads had just moved the field."""
-    point = OperatingPoint.of(recorded.spec)
-    usual = solve_coupled(recorded, point)
+    point = OperatingPoint.of(small.spec)
+    usual = solve_coupled(small, point)
     number = 0
 
     def loose(*arguments, **settings):
@@ -56,7 +56,7 @@ def test_a_solution_is_not_taken_while_its_equations_are_not_solved(recorded, mo
         return dataclasses.replace(found, residual=2e-9) if number <= usual.iterations else found
 
     monkeypatch.setattr("spindle_fem.solvers.coupled_steady.solve_steady", loose)
-    found = solve_coupled(recorded, point)
+    found = solve_coupled(small, point)
     assert found.iterations == usual.iterations + 1
     assert found.solution.residual <= LINEAR_RESIDUAL_LIMIT
 
@@ -65,9 +65,9 @@ def test_channel_wall_has_the_exact_helical_area(recorded_result):
     assert recorded_result.coolant.wetted_area == pytest.approx(0.1562, rel=1e-3)
 
 
-def test_temperatures_rise_in_proportion_to_heat(recorded):
+def test_temperatures_rise_in_proportion_to_heat(small):
     """With films, flow and oil properties fixed, double heat is double rise over one ambient."""
-    spec = recorded.spec
+    spec = small.spec
     table = spec.heat.table
     doubled = table.model_copy(
         update={"heat": {name: tuple(2.0 * value for value in row) for name, row in table.heat.items()}}
@@ -75,18 +75,16 @@ def test_temperatures_rise_in_proportion_to_heat(recorded):
     point = dataclasses.replace(
         OperatingPoint.of(spec), coolant_inlet_temperature=290.75, ambient_temperature=290.75
     )
-    single = solve_prepared(recorded, point)
-    heated = prepare_machine(
-        spec.model_copy(update={"heat": spec.heat.model_copy(update={"table": doubled})})
-    )
-    twice = solve_prepared(heated, point)
+    single = solve_prepared(small, point)
+    heated = spec.model_copy(update={"heat": spec.heat.model_copy(update={"table": doubled})})
+    twice = solve_prepared(machine_on_mesh(heated, small.mesh, small.operators), point)
     rise, doubled_rise = single.temperature - 290.75, twice.temperature - 290.75
     assert np.abs(doubled_rise - 2.0 * rise).max() < 1e-6 * rise.max()
 
 
-def test_no_heat_leaves_the_machine_between_its_surroundings(recorded):
-    point = dataclasses.replace(OperatingPoint.of(recorded.spec), speed=0.0)
-    result = solve_prepared(recorded, point)
+def test_no_heat_leaves_the_machine_between_its_surroundings(small):
+    point = dataclasses.replace(OperatingPoint.of(small.spec), speed=0.0)
+    result = solve_prepared(small, point)
     assert result.energy.heat_in == 0.0
     assert result.temperature.min() > 288.15 - 1e-9
     assert result.temperature.max() < 290.75 + 1e-9
@@ -97,13 +95,13 @@ def test_rotating_parts_are_uniform_around_the_axis(recorded_result):
     assert _first_harmonic(recorded_result, "F1.outer_raceway") > 0.1
 
 
-def test_without_averaging_the_inner_ring_follows_the_outer_one(recorded, recorded_result):
-    spec = recorded.spec
+def test_without_averaging_the_inner_ring_follows_the_outer_one(small, small_result):
+    spec = small.spec
     kept = spec.model_copy(update={"mesh": spec.mesh.model_copy(update={"circumferential_averaging": False})})
-    local = solve_prepared(prepare_machine(kept))
-    averaged = _first_harmonic(recorded_result, "F1.inner_raceway")
+    local = solve_prepared(machine_on_mesh(kept, small.mesh, small.operators))
+    averaged = _first_harmonic(small_result, "F1.inner_raceway")
     assert _first_harmonic(local, "F1.inner_raceway") > 5.0 * averaged
-    assert local.probes["SP01"] == pytest.approx(recorded_result.probes["SP01"], abs=0.2)
+    assert local.probes["SP01"] == pytest.approx(small_result.probes["SP01"], abs=0.2)
 
 
 def _first_harmonic(result, surface):
@@ -117,15 +115,11 @@ def _first_harmonic(result, surface):
     return np.hypot(*coefficients[-2:])
 
 
-def test_linear_and_quadratic_temperatures_agree(recorded, recorded_result):
-    spec = recorded.spec
-    linear = solve_prepared(
-        prepare_machine(spec.model_copy(update={"mesh": spec.mesh.model_copy(update={"order": 1})}))
-    )
-    assert linear.n_unknowns < recorded_result.n_unknowns / 3
+def test_linear_and_quadratic_temperatures_agree(small_result, recorded_result):
+    assert small_result.n_unknowns < recorded_result.n_unknowns / 3
     for name, value in recorded_result.probes.items():
         # Straight temperatures on elements of 10-20 mm; the rings alone span 15 K.
-        assert linear.probes[name] == pytest.approx(value, abs=0.5)
+        assert small_result.probes[name] == pytest.approx(value, abs=0.5)
 
 
 def test_ring_difference_is_what_the_ball_row_and_heat_make_of_it(recorded_result):
@@ -183,12 +177,12 @@ def test_every_heat_model_finds_its_fixed_point(reference, model):
     assert result.bearings["F1"].heat == pytest.approx(expected, rel=0.2)
 
 
-def test_grease_beyond_its_limit_fails_the_run(recorded):
-    spec = recorded.spec
+def test_grease_beyond_its_limit_fails_the_run(small):
+    spec = small.spec
     cool_grease = spec.model_copy(
         update={"grease": spec.grease.model_copy(update={"temperature_limit": 310.0})}
     )
-    result = solve_prepared(prepare_machine(cool_grease))
+    result = solve_prepared(machine_on_mesh(cool_grease, small.mesh, small.operators))
     with pytest.raises(CheckFailedError, match=r"grease temperature 50\..* degC \(limit 36\.85\)"):
         require_checks(result.checks, "recorded")
 
