@@ -35,4 +35,5 @@ def process():
 def small_run(process, tmp_path_factory):
     """One run of the small two-start spindle, shared by the tests that look at its files."""
     folder = tmp_path_factory.mktemp("run") / "out"
-    return folder, process("run", "small_two_start", "--set", "mesh.preset=coarse", "-o", folder, "--json")
+    small = ("--set", "mesh.preset=coarse", "--set", "mesh.order=1")
+    return folder, process("run", "small_two_start", *small, "-o", folder, "--json")

@@ -148,14 +148,17 @@ def test_the_reference_run_is_a_state_that_its_preload_allows(reference_result):
         assert reference_result.growth.seats[name, "shaft"].pressure > 0.0
 
 
-def test_bearings_of_the_size_of_assembly_say_what_is_left_out(reference, reference_result):
-    machine = without_expansion(reference)
-    result = solve_prepared(machine)
-    (text,) = [item.text for item in result.warnings if item.code == "thermal_preload_omitted"]
+@pytest.fixture(scope="module")
+def rigid_result(reference):
+    return solve_prepared(without_expansion(reference))
+
+
+def test_bearings_of_the_size_of_assembly_say_what_is_left_out(rigid_result, reference_result):
+    (text,) = [item.text for item in rigid_result.warnings if item.code == "thermal_preload_omitted"]
     told = re.search(r"preload of F3 would be (\d+) N instead of (\d+) N.* (\d+) W instead of (\d+) W", text)
     hot, cold, more, less = (float(value) for value in told.groups())
     assert hot > 1.3 * cold
-    assert less == pytest.approx(result.bearings["F3"].heat, abs=0.5)
+    assert less == pytest.approx(rigid_result.bearings["F3"].heat, abs=0.5)
     assert less < more < 1.5 * reference_result.bearings["F3"].heat
 
 
@@ -324,18 +327,17 @@ def test_contacts_need_one_group_each(recorded):
     )
 
 
-def test_effects_act_where_balls_follow_their_contacts(reference, tmp_path):
+def test_effects_act_where_balls_follow_their_contacts(reference, rigid_result, tmp_path):
     text = 'schema = "spindle-fem/machine/1"\nname = "more"\nbase = "wu_tan_2016"\n[[effect]]\n'
     text += 'effect = "heat_scale"\ncomponent = "front_bearings"\nparameters = {"heat.front" = 1.5}\n'
     (tmp_path / "more.toml").write_text(text, encoding="utf-8")
     chosen = ["mesh.preset=coarse", "mesh.order=1", "heat.thermal_preload=false"]
     spec = load_machine(tmp_path / "more.toml", chosen)
     assert spec.bearing_set[0].ball_row.kind == "contact"
-    rigid = without_expansion(reference)
-    more = solve_prepared(dataclasses.replace(rigid, spec=spec))
+    more = solve_prepared(dataclasses.replace(without_expansion(reference), spec=spec))
     heat, usual = (
         sum(bearing.heat for name, bearing in found.bearings.items() if name.startswith("F"))
-        for found in (more, solve_prepared(rigid))
+        for found in (more, rigid_result)
     )
     # warmer grease takes some of it back
     assert 1.1 * usual < heat < 1.5 * usual
