@@ -10,7 +10,7 @@ RESULT ?= runs/wu_tan_2016
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test setup lint lowest docs wheel-check first-hour browser reference study book proof hardening clean
+.PHONY: run test kernels setup lint lowest docs wheel-check first-hour browser reference study book proof hardening clean
 
 run: $(READY)
 	$(BIN)/spindle-fem run -o $(RESULT)
@@ -23,8 +23,12 @@ reference: run
 	    bearings_front.png heat_balance.png over_speed_heat_terms.png deformed_machine.png) reports/reference_run/figures/
 
 test: $(READY) lint
+	$(MAKE) --no-print-directory -j2 wheel-check kernels
 	$(BIN)/python -m pytest -q
-	$(MAKE) --no-print-directory wheel-check
+
+# What a first diagnosis, and each worker of the tests, would wait for is compiled and kept beside its module.
+kernels: $(READY)
+	$(BIN)/python examples/diagnose.py build/kernels >/dev/null
 
 lint: $(READY)
 	$(BIN)/ruff check .
