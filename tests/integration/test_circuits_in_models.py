@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spindle_fem.cache import CACHE_VARIABLE
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.catalogue.coolant_film import CoolantFilm
@@ -24,7 +23,7 @@ from spindle_fem.results.run_summary import build_summary
 from spindle_fem.solvers.coupled_steady import circuit_outlets, solve_coupled
 from spindle_fem.solvers.machine_network_steady import solve_machine_network
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full, start_from
-from spindle_fem.solvers.prepared_machine import prepare_machine
+from spindle_fem.solvers.prepared_machine import machine_on_mesh, prepare_machine
 from spindle_fem.studies.solve_machine import solve_prepared
 from spindle_fem.studies.sweep.evaluate_design import row_of, solve_checked
 from spindle_fem.studies.sweep.fast_backend import GroupTask, answer_tasks, model_of
@@ -136,7 +135,7 @@ def test_the_network_gives_the_bore_about_as_much(result, spec):
 def test_the_fast_model_settles_where_the_elements_do(machine, fast, factors):
     changed = with_parameters(machine.spec, factors)
     point = replace(OperatingPoint.of(machine.spec), ambient_temperature=293.15)
-    full = solve_coupled(prepare_machine(changed), point)
+    full = solve_coupled(machine_on_mesh(changed, machine.mesh, machine.operators), point)
     times = np.linspace(0.0, 4.0e6, 4000)
     given = (point.speed, point.thrust, 293.15, point.coolant_inlet_temperature, point.coolant_flow)
     values = np.tile(given, (times.size, 1))
@@ -245,8 +244,7 @@ def _solved(machine):
     return found.solution, found.loads
 
 
-def test_a_sweep_over_the_flow_of_the_bore_has_what_full_solves_have(definition, tmp_path, monkeypatch):
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+def test_a_sweep_over_the_flow_of_the_bore_has_what_full_solves_have(definition, tmp_path):
     outputs = ["temperature.max_degC", "probes.BORE_OUT", "energy.heat_out_W.bore.1"]
     study = """
 schema = "spindle-fem/study/1"

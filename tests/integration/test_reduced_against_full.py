@@ -27,7 +27,7 @@ from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.coupled_steady import solve_coupled
 from spindle_fem.solvers.machine_transient import TransientOptions, simulate_full
-from spindle_fem.solvers.prepared_machine import prepare_machine
+from spindle_fem.solvers.prepared_machine import machine_on_mesh
 from spindle_fem.units import Uncertain
 
 ROOT = Path(__file__).parents[2]
@@ -40,6 +40,11 @@ FLOW = 20.0e-3 / 60.0
 @pytest.fixture(scope="module")
 def machine(small):
     return small
+
+
+@pytest.fixture(scope="module")
+def on_mesh(machine):
+    return build_mesh_model(machine)
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +70,7 @@ def test_what_a_check_misses_is_solved_as_closely_as_the_probes_ask(monkeypatch,
     assert fast_model_for(small, []).model.errors["probes"] <= ReductionOptions().error
 
 
-def test_every_operator_conserves_heat(machine):
-    on_mesh = build_mesh_model(machine)
+def test_every_operator_conserves_heat(machine, on_mesh):
     one = np.ones(on_mesh.size)
     for name, matrix in zip(on_mesh.coefficient_names, on_mesh.operators, strict=True):
         leaving = matrix @ one
@@ -106,7 +110,7 @@ def test_its_steady_state_is_that_of_the_coupled_full_model(machine, fast, speed
         coolant_flow=FLOW,
     )
     spec = with_parameters(machine.spec, factors)
-    full = solve_coupled(prepare_machine(spec), point)
+    full = solve_coupled(machine_on_mesh(spec, machine.mesh, machine.operators), point)
     times = np.linspace(0.0, 4.0e6, 8000)
     values = history(times, speed * RPM, 293.15, inlet)
     drive = make_drive(times, STANDARD, values, HELD, largest_step=1.0e4)
@@ -129,8 +133,10 @@ def test_its_steady_state_is_that_of_the_coupled_full_model(machine, fast, speed
     ],
     ids=lambda v: str(v),
 )
-def test_a_seat_that_alone_is_worse_moves_the_probes_as_in_the_full_model(machine, fast, seats, factor):
-    on_mesh, model = build_mesh_model(machine), fast.model
+def test_a_seat_that_alone_is_worse_moves_the_probes_as_in_the_full_model(
+    machine, on_mesh, fast, seats, factor
+):
+    model = fast.model
     point = replace(OperatingPoint.of(machine.spec), speed=3000.0 * RPM)
     film = fast.channel.film(point, {})[0]
     raceways = [f"{name}.{side}_raceway" for name in fast.bearings for side in ("inner", "outer")]
@@ -149,9 +155,8 @@ def test_a_seat_that_alone_is_worse_moves_the_probes_as_in_the_full_model(machin
     assert np.abs(reduced_change - change).max() < 0.03 * np.abs(change).max()
 
 
-def test_ring_spot_and_sides_stand_for_heat_on_a_part_of_the_housing(machine, fast):
+def test_ring_spot_and_sides_stand_for_heat_on_a_part_of_the_housing(machine, on_mesh, fast):
     """72° of the top, 60 mm long, above the probe: at rest and while the heat changes."""
-    on_mesh = build_mesh_model(machine)
     values = fast.table.base(point := OperatingPoint.of(machine.spec))
     capacity = on_mesh.capacity(fast.table.capacities())
     conduction = on_mesh.conduction(values, fast.channel.film(point, {})[0])
