@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import settings
 
 from tests.support.written_texts import manifest_text
 
@@ -24,6 +25,9 @@ gc.set_threshold(50_000, 20, 20)
 # and every command that a test starts compiles the package once more.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# Seconds are asserted nowhere: a busy machine would fail what is right.
+settings.register_profile("any machine", deadline=None)
+settings.load_profile("any machine")
 
 
 def pytest_collection_finish():

@@ -76,6 +76,7 @@ def test_a_machine_within_its_priors_is_consistent(machine, tmp_path, seed):
     require_probabilities(content)
 
 
+@pytest.mark.slow
 def test_a_link_beyond_what_the_calibration_told_is_a_parameter(machine, tmp_path):
     built = as_built(4)
     earlier = record(tmp_path / "earlier", 4, built=built)
