@@ -422,7 +422,7 @@ def _tangent(
         solved_distance = np.zeros((system.number, 0, 2))
         stiffness = evaluation.by_distance
     maps = np.stack([system.axial_map, system.radial_map], axis=1)
-    rows = maps.reshape(-1, maps.shape[2])
+    rows = maps.reshape(2 * system.number, maps.shape[2])
     tangent = rows.T @ (system.weight[:, None, None] * (stiffness @ maps)).reshape(rows.shape)
     if system.rings is not None:
         columns = system.rings.columns
