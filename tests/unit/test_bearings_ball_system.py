@@ -22,12 +22,10 @@ def system() -> BallSystem:
     """Two opposed bearings on one shaft, of 9 and 7 balls of unequal weights; the rear's outer ring
     floats on a spring."""
     geometry = BearingGeometry(14e-3, 9, 90e-3, math.radians(15.0), 0.52, 0.53)
-    rows = [
-        build_ball_rows(
-            geometry, 2.0 * np.pi * np.arange(balls) / balls, 1.0, axial_offset=2e-5, place=(side, 0.04 * side)
-        )
-        for balls, side in ((9, 1), (7, -1))
-    ]  # fmt: skip
+    rows = []
+    for balls, side in ((9, 1), (7, -1)):
+        azimuth = 2.0 * np.pi * np.arange(balls) / balls
+        rows.append(build_ball_rows(geometry, azimuth, 1.0, axial_offset=2e-5, place=(side, 0.04 * side)))
     joined = join_rows(rows, [0, 1, 2, 3, 4])
     floating = np.repeat([[0.0], [1.0]], (9, 7), axis=0)
     return replace(
