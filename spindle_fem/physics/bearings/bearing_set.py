@@ -148,9 +148,7 @@ def solve_states(
         _require_consistent(bearing_set, entry, control, lubricant)
     speed = abs(speed)
     loads = (load,) * len(temperatures) if isinstance(load, ExternalLoad) else load
-    problems = [
-        build_problem(bearing_set, speed, own, entry) for own, entry in zip(loads, temperatures, strict=True)
-    ]
+    problems = _problems(bearing_set, speed, loads, temperatures)
     films = [entry.film for state in temperatures for entry in state.bearings]
     rows = [row for problem in problems for row in problem.rows]
     film = None
@@ -174,6 +172,25 @@ def solve_states(
         heat,
     )
     return tuple(states[first : first + number] for first in range(0, len(states), number))
+
+
+def _problems(
+    bearing_set: BearingSet,
+    speed: float,
+    loads: Sequence[ExternalLoad],
+    temperatures: Sequence[SetTemperatures],
+) -> list[SetProblem]:
+    """Problem of every state; states that only their films' temperatures tell apart share one."""
+    known: dict[object, SetProblem] = {}
+    problems = []
+    for load, entry in zip(loads, temperatures, strict=True):
+        bodies = tuple(replace(bearing, lubricant=None) for bearing in entry.bearings)
+        shifts = None if entry.shifts is None else entry.shifts.tobytes()
+        key = load, bodies, entry.shaft, entry.housing, entry.assembly, shifts
+        if key not in known:
+            known[key] = build_problem(bearing_set, speed, load, entry)
+        problems.append(known[key])
+    return problems
 
 
 def _is_held(bearing_set: BearingSet, loads: Sequence[ExternalLoad]) -> bool:
@@ -345,7 +362,8 @@ def _solve(
             if near is not None:
                 recent[key] = speed, near
                 return near
-    start = np.concatenate([start_displacement(problem, where) for problem in problems])
+    starts = {problem: start_displacement(problem, where) for problem in dict.fromkeys(problems)}
+    start = np.concatenate([starts[problem] for problem in problems])
     solved = solve_equilibrium(
         system, speed, load, control, at_rest=(start, ball_load), lubricant=film, options=options,
         where=where,
