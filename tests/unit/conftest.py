@@ -18,10 +18,21 @@ def fast(spec):
     return fast_spindle(lumped_model(spec), spec)
 
 
-@pytest.fixture(scope="session")
-def steps():
-    times = np.arange(0.0, 7200.0, 60.0)
-    speed = np.select([times < 600, times < 3000, times < 5400], [0.0, 3000.0, 1500.0], 4000.0)
+def driven_for(seconds):
+    times = np.arange(0.0, seconds, 60.0)
+    share = times / seconds
+    speed = np.select([share < 1 / 12, share < 5 / 12, share < 3 / 4], [0.0, 3000.0, 1500.0], 4000.0)
     return drive_of(
         times, speed, ambient=293.0 + np.sin(times / 900.0), inlet=289.0 + 0.5 * np.cos(times / 500.0)
     )
+
+
+@pytest.fixture(scope="session")
+def steps():
+    return driven_for(7200.0)
+
+
+@pytest.fixture(scope="session")
+def short_drive():
+    """Through the same speeds in a third of the time, where a run is marched dozens of times."""
+    return driven_for(2400.0)

@@ -21,7 +21,7 @@ of_terms = pytest.mark.parametrize(
 
 
 @of_terms
-def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps, monkeypatch, terms):
+def test_derivatives_with_terms_are_those_of_differences(fast, spec, short_drive, monkeypatch, terms):
     # Derivatives are those at Newton's last but one iterate: exact to its last change.
     for module in (added_heat, term_march):
         monkeypatch.setattr(module, "TEMPERATURE_TOLERANCE", 1e-7)
@@ -36,14 +36,14 @@ def test_derivatives_with_terms_are_those_of_differences(fast, spec, steps, monk
         "heat.front",
         "heat.inner_share",
     )
-    run = simulate_fast(fast, steps, 293.15, terms=terms, derivatives=names)
+    run = simulate_fast(fast, short_drive, 293.15, terms=terms, derivatives=names)
     for column, name in enumerate(names):
         item = owned.get(name)
         value = 1.0 if item is None else item.value
         width = 1e-5 * value
         ends = [
             simulate_fast(
-                fast, steps, 293.15, terms=terms, parameters={name: value + sign * width}
+                fast, short_drive, 293.15, terms=terms, parameters={name: value + sign * width}
             ).temperature
             for sign in (1.0, -1.0)
         ]
