@@ -202,7 +202,9 @@ def with_input(drive, name, values):
 
 
 @needs_compiler
-def test_sources_are_inputs_or_tables(fast, drive, tmp_path):
+def test_sources_are_inputs_or_tables_and_windings_follow_the_torque(fast, drive, tmp_path):
+    iron = {"speed": ["0 rpm", "4500 rpm"], "heat": ["0 W", "90 W"]}
+    motor = {"copper_loss": "80 W", "rated_torque": "10 N*m"}
     table = {
         "speed": ["0 rpm", "2000 rpm", "8000 rpm"],
         "thrust": ["1200 N", "1500 N"],
@@ -213,13 +215,18 @@ def test_sources_are_inputs_or_tables(fast, drive, tmp_path):
         {"name": "rotor", "part": "shaft", "input": "motor_power", "gain": "0.1 W/W", "heat": "12 W"},
         {"name": "seal", "part": "housing", "heat": "20 W"},
         {"name": "belt", "part": "shaft", "heat": table},
+        {"name": "windings", "part": "shaft", **motor},
+        {"name": "motor", "part": "housing", **motor, "heat": iron},
     )
-    power = with_input(drive, "motor_power", np.linspace(400.0, 900.0, drive.steps.size))
+    loaded = with_input(drive, "torque", np.linspace(0.0, 18.0, drive.steps.size))
+    power = with_input(loaded, "motor_power", np.linspace(400.0, 900.0, drive.steps.size))
     space, path = geometry_state_space(heated, "lumped", 4500.0 * RPM), tmp_path / "model.c"
     model = space.model()
     told = resolved_run(heated, power, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
     named = {item["name"]: (item["unit"], item["default"]) for item in model.header["inputs"]}
     assert (named["motor_power"], named["heat.seal"]) == (("W", pytest.approx(120.0)), ("W", 20.0))
+    (torque,) = (item for item in model.header["inputs"] if item["name"] == "torque")
+    assert (torque["unit"], torque["high"]) == ("N*m", 20.0)
     every = with_input(power, "heat.seal", np.full(drive.steps.size, 20.0))
     found = readings_along(model, every, {0: START})
     assert np.abs(found - told).max() < AGREEMENT
@@ -239,24 +246,6 @@ def test_a_source_without_its_quantity_gives_what_the_definition_says(fast):
     table = {"speed": ["0 rpm", "1 rpm"], "heat": ["0 W", "1 W"]}
     (note,) = source_loads(with_sources(fast, {**source, "heat": table}).spec, standard).notes
     assert "its own heat" in note
-
-
-def test_windings_follow_the_torque_of_an_exported_model(fast, drive):
-    iron = {"speed": ["0 rpm", "4500 rpm"], "heat": ["0 W", "90 W"]}
-    motor = {"copper_loss": "80 W", "rated_torque": "10 N*m"}
-    heated = with_sources(
-        fast,
-        {"name": "windings", "part": "shaft", **motor},
-        {"name": "motor", "part": "housing", **motor, "heat": iron},
-    )
-    space = geometry_state_space(heated, "lumped", 4500.0 * RPM)
-    model = space.model()
-    (torque,) = (item for item in model.header["inputs"] if item["name"] == "torque")
-    assert (torque["unit"], torque["high"]) == ("N*m", 20.0)
-    loaded = with_input(drive, "torque", np.linspace(0.0, 18.0, drive.steps.size))
-    told = resolved_run(heated, loaded, START + ZERO_CELSIUS_K).temperature[1:] - ZERO_CELSIUS_K
-    found = readings_along(model, loaded, {0: START})
-    assert np.abs(found - told).max() < AGREEMENT
 
 
 @pytest.mark.slow
