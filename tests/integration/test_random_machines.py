@@ -17,6 +17,7 @@ from spindle_fem.solvers.machine_network_steady import BALANCE_TOLERANCE, solve_
 from tests.support.valid_definition import VALID
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 2, 3, 5, 6, 7, 13, 14, 15, 16])
 def test_by_the_machine_s_own_network(number, tmp_path):
     content = draw_machine(np.random.default_rng([3, number]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -202,8 +203,9 @@ def test_a_closed_shape_looks_the_same_without_what_faces_away():
     assert (images[0] != images[1]).any(axis=2).mean() < 1e-3
 
 
+@lru_cache(maxsize=16)
 def texts_of(figure):
-    """Every text of a figure that is drawn, with its place in pixels."""
+    """Every text of a figure that is drawn, with its place in pixels; drawn once, as no test changes one."""
     figure.canvas.draw()
     shown = [item for item in figure.findobj(Text) if item.get_visible() and item.get_text().strip()]
     # numbers of an axis beyond its ends are objects, but not drawn
