@@ -83,12 +83,12 @@ def causes_of(rows: list[dict[str, Any]], seed: int | None, generator: str) -> d
 def kept_studies(known: list[dict[str, Any]], given: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Studies of an earlier page that are not given again, with the causes that are known now."""
     names = {study["name"] for study in given}
-    kept = [study for study in known if study["name"] not in names]
     return [
         study
-        | figures_of(rows := study["rows"])
-        | {"causes": causes_of(rows, study["seed"], study["generator"])}
-        for study in kept
+        | figures_of(study["rows"])
+        | {"causes": causes_of(study["rows"], study["seed"], study["generator"])}
+        for study in known
+        if study["name"] not in names
     ]
 
 
