@@ -29,7 +29,7 @@ from spindle_fem.physics.bearings.preload import axial_state
 
 GREASE = Lubricant(21e-6, 4.7e-6, density=990.0)
 BEARING = BearingGeometry(14.2875e-3, 30, 165e-3, math.radians(15.0), 0.52, 0.52)
-QUICK = settings(max_examples=20, deadline=None, derandomize=True)
+QUICK = settings(max_examples=20, derandomize=True)
 
 
 def turn(rpm: float) -> float:
@@ -152,7 +152,7 @@ def test_hertz_two_thirds_power() -> None:
     assert high.approach / low.approach == pytest.approx(4.0, rel=5e-3)
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=10, derandomize=True)
 @given(st.floats(0.0, 1.0))
 def test_symmetry_about_the_radial_load(share: float) -> None:
     state = solve_bearing(BEARING, turn(3000), ExternalLoad(1137.2, 500.0 * share + 1.0), control="outer")
@@ -185,7 +185,7 @@ def test_back_to_back_pair_is_symmetric_and_turns_with_the_thrust() -> None:
     assert forward[0].axial_force - forward[1].axial_force == pytest.approx(400.0, rel=1e-8)
 
 
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=8, derandomize=True)
 @given(st.floats(500.0, 4000.0), st.floats(1.05, 1.3))
 def test_film_and_heat_grow_with_speed(rpm: float, factor: float) -> None:
     slow = solve_bearing(BEARING, turn(rpm), 1137.2, lubricant=GREASE)

@@ -45,7 +45,7 @@ def problems(draw):
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(problems(), st.floats(1.0, 1e4), methods)
 def test_twice_the_heat_gives_twice_the_rise(problem, heat, method):
     cold = solve_steady(problem, method=method).temperature
@@ -57,7 +57,7 @@ def test_twice_the_heat_gives_twice_the_rise(problem, heat, method):
     np.testing.assert_allclose(twice - cold, 2.0 * (once - cold), rtol=0, atol=1e-7 * max(scale, 1.0))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(problems())
 def test_without_heat_surroundings_bound_the_mean_temperatures(problem):
     """Facet means and lumped nodes stay between the coldest and the hottest surroundings."""
@@ -76,7 +76,7 @@ def test_without_heat_surroundings_bound_the_mean_temperatures(problem):
         assert low <= mean <= high
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(problems(), st.floats(0.0, 1e4), st.floats(0.0, 1e4), methods)
 def test_heat_in_equals_heat_out(problem, surface, part, method):
     loaded = replace(problem, surface_heat={"inner.inner": surface}, part_heat={"outer": part})
@@ -85,7 +85,7 @@ def test_heat_in_equals_heat_out(problem, surface, part, method):
     assert abs(sum(balance.films.values()) - surface - part) < 1e-9 * balance.turnover
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(problems())
 def test_matrix_is_symmetric_and_carries_no_heat_of_its_own(problem):
     system = assemble_system(problem)
@@ -97,7 +97,7 @@ def test_matrix_is_symmetric_and_carries_no_heat_of_its_own(problem):
     assert np.abs(residual).max() < 1e-12 * abs(matrix).max()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(problems(), st.floats(10.0, 1e3), st.floats(1.0, 1e5))
 def test_stored_heat_is_heat_in_minus_heat_out(problem, heat, span):
     loaded = replace(problem, part_heat={"inner": heat})

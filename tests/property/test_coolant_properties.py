@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from spindle_fem.physics.coolant.channel_section import ChannelSection
@@ -104,7 +104,6 @@ def test_helical_film_is_continuous_in_temperature(temperature, coolant):
 cells = st.integers(1, 40)
 
 
-@settings(deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     number=cells,
@@ -129,7 +128,6 @@ def test_march_closes_and_obeys_the_maximum_principle(seed, number, inlet, sprea
     np.testing.assert_allclose(heat, march.heat, atol=1e-8 * scale)
 
 
-@settings(deadline=None)
 @example(inlet=12.0, difference=0.03125, litres=2.0, model="helical", number=1)
 @given(
     inlet=st.floats(12.0, 30.0),

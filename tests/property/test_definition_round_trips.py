@@ -68,7 +68,7 @@ def test_no_text_makes_the_reader_fail_in_another_way(text):
         assert isinstance(to_si(text, "m", where="key"), float)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     depth=st.floats(min_value=5.0, max_value=30.0),
     width=st.floats(min_value=6.0, max_value=20.0),
@@ -93,7 +93,7 @@ def test_a_machine_with_any_values_reads_back_equal(depth, width, speed, inlet, 
     assert spec.coolant.film_factor == Uncertain(1.0, pytest.approx(sigma, rel=1e-12))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_factors_and_their_inverses_cancel(data):
     spec = load_machine("recorded_spindle")
@@ -143,7 +143,7 @@ JUNK = [3, -1, "x", "", True, [], [1], {}, {"name": 3}, math.nan, [{}], "none", 
 JUNK += [{"value": "1 m", "sigma_rel": 0.1}, [{"name": "a"}, {"name": "a"}], datetime.date(2020, 1, 1)]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(path=st.sampled_from(list(paths_of(DEFINITION))), junk=st.sampled_from(JUNK))
 def test_junk_anywhere_in_a_definition_is_read_or_refused_never_a_crash(path, junk):
     content = copy.deepcopy(DEFINITION)

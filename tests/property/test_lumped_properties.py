@@ -11,7 +11,7 @@ from spindle_fem.solvers.network_steady import solve_steady
 from tests.support.network_runs import modal_solution, run_network
 
 ROOM, BATH = 293.15, 303.15
-several = settings(max_examples=40, deadline=None)
+several = settings(max_examples=40)
 
 
 @st.composite
@@ -119,7 +119,7 @@ def test_exact_steps_do_not_depend_on_how_time_is_cut(network, parts):
     assert_allclose(cut.states[-1], whole.states[-1], rtol=1e-10)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(networks())
 def test_agreement_with_the_modes(network):
     history = InputHistory(

@@ -55,7 +55,7 @@ def samples(draw):
     return times, kelvin, np.round(random.uniform(0, 4000, number)), random
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(samples())
 def test_row_order_does_not_matter(data):
     times, kelvin, speed, random = data
@@ -72,7 +72,7 @@ def test_row_order_does_not_matter(data):
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(samples(), st.integers(1, 10))
 def test_repeated_rows_change_nothing_but_their_count(data, repeats):
     times, kelvin, speed, random = data
@@ -85,7 +85,7 @@ def test_repeated_rows_change_nothing_but_their_count(data, repeats):
     assert doubled.defects.conflicting_stamps == 0
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(samples())
 def test_units_do_not_matter(data):
     times, kelvin, speed, _ = data
@@ -96,7 +96,7 @@ def test_units_do_not_matter(data):
         assert_allclose(other.times, plain.times, atol=1e-6)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(samples())
 def test_held_input_at_its_own_stamps_and_between(data):
     times, kelvin, speed, _ = data
@@ -127,7 +127,7 @@ SCRAPS = [
 ]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     st.lists(st.tuples(st.integers(0, len(PLAIN)), st.integers(0, 8), st.sampled_from(SCRAPS)), max_size=4)
 )
@@ -154,7 +154,7 @@ def test_damaged_files_are_read_or_refused_but_never_crash(damages):
     assert recording.defects.lines()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.integers(5, 194),
     st.floats(4.0, 50.0),
@@ -170,7 +170,7 @@ def test_one_spike_is_found_and_nothing_else(at, size, down, sigma, seed):
     assert flagged.tolist() == [at]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(0.001, 10.0), st.floats(-100.0, 100.0), st.floats(-1.0, 1.0), st.integers(0, 2**32 - 1))
 def test_noise_scales_and_ignores_offset_and_drift(scale, offset, drift, seed):
     noise = np.random.default_rng(seed).standard_normal(500)

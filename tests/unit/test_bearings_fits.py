@@ -143,7 +143,7 @@ def test_seats_open_and_close() -> None:
     assert rings.state(0.0, FitTemperatures(inner_ring=8.0), turn(4500)).inner_gap > 0.0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.floats(-20e-6, 30e-6), st.floats(-20e-6, 30e-6), st.floats(-20.0, 60.0), st.floats(-20.0, 60.0),
     st.floats(0.0, 700.0), st.floats(0.0, 5e4),

@@ -74,7 +74,7 @@ def test_a_vanishing_lag_follows_at_once_with_the_right_slope():
     assert told[1:, 0].imag / 1e-30 == pytest.approx(-0.05)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     steps=st.lists(st.floats(0.1, 500.0), min_size=2, max_size=40),
     tau=st.floats(0.5, 2000.0),

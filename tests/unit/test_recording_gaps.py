@@ -1,3 +1,5 @@
+"""What a machine may have done unseen within a gap of its recording."""
+
 from types import SimpleNamespace
 
 import numpy as np
@@ -6,13 +8,13 @@ import pytest
 from spindle_fem.inference import tuned
 from spindle_fem.inference.recording_gaps import hidden_in, spread_within
 
-minutes = 60.0 * np.arange(0.0, 401.0)
+LAST = 24000.0
 
 
 def recorded(speed, gap=(12000.0, 13200.0)):
     """A recording of a speed over the time, rows every minute but within a gap."""
     begin, end = gap
-    times = minutes[(minutes <= begin) | (minutes >= end)]
+    times = np.concatenate((np.arange(0.0, begin + 1.0, 60.0), np.arange(end, LAST + 1.0, 60.0)))
     return SimpleNamespace(times=times, input_names=("speed",), input_at=lambda name, t: speed(np.asarray(t)))
 
 
@@ -41,5 +43,5 @@ def test_windows_with_a_gap_of_their_own_and_speeds_nobody_recorded_tell_nothing
     once = recorded(lambda t: 3000.0 * (t > 12100.0))
     kept = once.times[(once.times <= 3000.0) | (once.times >= 4200.0)]
     assert spread_within(SimpleNamespace(**vars(once) | {"times": kept}), 3000.0, 3600.0) == 0.0
-    unread = SimpleNamespace(times=minutes, input_names=())
+    unread = SimpleNamespace(times=np.arange(0.0, LAST, 60.0), input_names=())
     assert spread_within(unread, 60.0, 120.0) == 0.0

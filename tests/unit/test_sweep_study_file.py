@@ -88,7 +88,7 @@ def test_a_sampled_range_crosses_the_grid_of_the_others(write, content):
     assert len({design.values["coolant.flow"] for design in designs}) == 4
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(size=st.integers(1, 40), dimensions=st.integers(1, 6), seed=st.integers(0, 1000))
 def test_a_larger_sobol_sample_keeps_the_smaller_one(size, dimensions, seed):
     small, large = (sample_points("sobol", dimensions, number, seed) for number in (size, size + 20))
