@@ -6,7 +6,7 @@ leaves them; answers count structure into ``noise.total_K``, by which effects ar
 """
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -18,6 +18,7 @@ from .draw import EVERY_EFFECT, FOREIGN_EFFECTS, MACHINE_EFFECTS
 from .draw_sensor_errors import SENSOR_EFFECTS
 from .generate import HEAVY, draw_stable, effect_answer, effects_set, judge, plan_for, what_is_known
 from .identify import Study
+from .machine import Deviation
 from .recorder import Logger, Noise, record
 from .reduction import ReducedSpindle, load_reduced
 from .rough import GRID, AsMounted, deviating_machine, draw_channels, draw_mounting, what_is_open
@@ -101,31 +102,63 @@ def _place_names(component: str) -> list[str]:
     return [component, *sets.get(component, []), *([places[component]] if component in places else [])]
 
 
-def make_case(
-    folder: FilePath, nominal: ReducedSpindle, pool: list, seed: int, number: int, identified: bool = True
-) -> dict[str, Any]:
-    """Draw, simulate and write one case; return its answer.
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """One case before it is written: a machine, its sensors and runs, and what is concealed in it.
+
+    ``rng`` goes on where the draw ended; ``told`` are the arguments of the identification; ``left`` in K by
+    channel.
+    """
+
+    rng: np.random.Generator
+    family: str
+    wanted: list[str]
+    deviation: Deviation
+    model: ReducedSpindle
+    mounted: AsMounted
+    as_built: dict[str, float]
+    sensors: Noise
+    logger: Logger
+    plans: list[Plan]
+    truths: list[np.ndarray]
+    left: np.ndarray
+    effects: list[Concealed]
+    told: tuple
+
+    @property
+    def noise_and_structure_K(self) -> tuple[float, float]:
+        """What sensors leave, and what the machine's shape leaves of the definition, each as RMS."""
+        sensor = np.sqrt(self.sensors.total_K**2 + self.sensors.rounding_K**2 / 12.0)
+        return float(sensor), float(np.sqrt((self.left**2).mean()))
+
+    def readings(self, plan: Plan) -> np.ndarray:
+        """(n, channels) K that the sensors show in a run, with everything concealed."""
+        laws = (self.mounted, *(e.machine for e in self.effects if e.machine))
+        read = run(self.model, plan.drive, self.as_built, laws).readings
+        for lie in (e.sensor for e in self.effects if e.sensor):
+            read = lie.apply(plan.drive.time, read, plan.drive.ambient)
+        return read
+
+
+def draw_case(nominal: ReducedSpindle, pool: list, seed: int, number: int) -> Drawn:
+    """The first of several machines that shows what the case is to show.
 
     Raises
     ------
     ArithmeticError
-        None of several machines shows what is wanted.
+        None of them does.
     """
     for attempt in range(MOST_MACHINES):
         try:
-            return _attempt(folder, nominal, pool, (seed, number, attempt), identified)
+            return _attempt(nominal, pool, (seed, number, attempt))
         except ArithmeticError:
             continue
     raise ArithmeticError(f"case {number}: no machine shows what is wanted")
 
 
-def _attempt(
-    folder: FilePath, nominal: ReducedSpindle, pool: list, seeds: tuple[int, int, int], identified: bool
-) -> dict[str, Any]:
+def _attempt(nominal: ReducedSpindle, pool: list, seeds: tuple[int, int, int]) -> Drawn:
     rng = np.random.default_rng(seeds)
-    number = seeds[1]
-    name = f"case_{number:04d}"
-    family, wanted = choose(number, rng)
+    family, wanted = choose(seeds[1], rng)
     deviation, model = pool[int(rng.integers(len(pool)))]
     mounted: AsMounted = draw_mounting(rng)
     as_built, sensors, channels = draw_as_built(rng), draw_sensors(rng), draw_channels(rng)
@@ -138,36 +171,61 @@ def _attempt(
     paths = [run(model, p.drive, as_built, (mounted,)) for p in plans]
     truths = [p.readings for p in paths]
     left = structure_left(nominal, plans, truths, (as_built, sensors, channels))
-    structure = float(np.sqrt((left**2).mean()))
-    sensor = float(np.sqrt(sensors.total_K**2 + sensors.rounding_K**2 / 12.0))
     # Structural residuals are as slow as the loads: effects are judged against both.
+    structure = float(np.sqrt((left**2).mean()))
     judged_by = Noise(sensors.white_K, float(np.hypot(sensors.slow_K, structure)), STRUCTURE_S)
+    calibration = plans[1] if len(plans) > 1 else None
+    told = (model, plans[0], calibration, as_built, judged_by, (mounted,), channels)
     effects: list[Concealed] = []
-    known = None
     if wanted:
-        calibration = plans[1] if len(plans) > 1 else None
-        told = (model, plans[0], calibration, as_built, judged_by, (mounted,), channels)
         study = Study(*told)
         for _ in range(20):
             effects, _ = draw_stable(wanted, study, paths[0], plans[0], rng)
             if read_channels(effects, channels):
                 break
-        known = what_is_known(Study(*told, what_is_open()), effects) if identified else None
-    readings = run(
-        model, plans[0].drive, as_built, (mounted, *(e.machine for e in effects if e.machine))
-    ).readings
-    for lie in (e.sensor for e in effects if e.sensor):
-        readings = lie.apply(plans[0].drive.time, readings, plans[0].drive.ambient)
-    inputs = folder / "inputs" / name
-    rows = {"recording": record(inputs, "recording", name, plans[0], readings, sensors, rng, logger)}
+    return Drawn(
+        rng,
+        family,
+        wanted,
+        deviation,
+        model,
+        mounted,
+        as_built,
+        sensors,
+        logger,
+        plans,
+        truths,
+        left,
+        effects,
+        told,
+    )
+
+
+def make_case(
+    folder: FilePath, nominal: ReducedSpindle, pool: list, seed: int, number: int, identified: bool = True
+) -> dict[str, Any]:
+    """Draw, simulate and write one case; return its answer.
+
+    Raises
+    ------
+    ArithmeticError
+        None of several machines shows what is wanted.
+    """
+    name = f"case_{number:04d}"
+    case = draw_case(nominal, pool, seed, number)
+    effects, plans, logger, sensors = case.effects, case.plans, case.logger, case.sensors
+    known = what_is_known(Study(*case.told, what_is_open()), effects) if effects and identified else None
+    inputs, rest = folder / "inputs" / name, (sensors, case.rng, logger)
+    rows = {"recording": record(inputs, "recording", name, plans[0], case.readings(plans[0]), *rest)}
     if len(plans) > 1:
         rows["calibration"] = record(
-            inputs, "calibration", f"{name} calibration", plans[1], truths[1], sensors, rng, logger
+            inputs, "calibration", f"{name} calibration", plans[1], case.truths[1], *rest
         )
+    sensor, structure = case.noise_and_structure_K
     answer = {
         "schema": "spindle-fem/answer/1",
         "case": name,
-        "family": family,
+        "family": case.family,
         "machine": "recorded_spindle",
         "profile": plans[0].cycle,
         "two_recordings": len(plans) > 1,
@@ -175,9 +233,9 @@ def _attempt(
         | {"sensor_K": sensor, "structure_K": structure, "total_K": float(np.hypot(sensor, structure))},
         "channels": logger.names,
         "clock_offset_s": logger.late,
-        "as_built": {k: round(v, 4) for k, v in as_built.items()},
-        "structure": mounted.answer(deviation)
-        | {"refitted_residual_K": dict(zip(logger.names, np.round(left, 4).tolist(), strict=True))},
+        "as_built": {k: round(v, 4) for k, v in case.as_built.items()},
+        "structure": case.mounted.answer(case.deviation)
+        | {"refitted_residual_K": dict(zip(logger.names, np.round(case.left, 4).tolist(), strict=True))},
         "identifiability": known,
         **with_twins(effects, judge(effects, known, len(plans) > 1)),
         "effects": [effect_answer(e) for e in effects],
@@ -190,17 +248,22 @@ def _attempt(
     return answer
 
 
+def machines(seed: int, shapes: int, cache: FilePath | None) -> tuple[ReducedSpindle, list]:
+    """The machine as defined, and the pool of deviating ones."""
+    pool = []
+    for number in range(shapes):
+        pool.append(deviating_machine(seed, number, cache))
+        print(f"shape {number + 1} of {shapes}", flush=True)
+    return load_reduced(cache, **GRID), pool
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
     parser = study_options(__doc__, cases=60, seed=3)
     parser.add_argument("--shapes", type=int, default=6, help="machines of deviating shape in the pool")
     parser.add_argument("--cache", type=FilePath, default=None, help="folder of the reduced machines")
     given = parser.parse_args(arguments)
-    nominal = load_reduced(given.cache, **GRID)
-    pool = []
-    for number in range(given.shapes):
-        pool.append(deviating_machine(given.seed, number, given.cache))
-        print(f"shape {number + 1} of {given.shapes}", flush=True)
+    nominal, pool = machines(given.seed, given.shapes, given.cache)
     write_study(
         given,
         lambda number: make_case(given.output, nominal, pool, given.seed, number),

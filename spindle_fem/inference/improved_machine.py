@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from spindle_fem.definition import network_load as network_spec
 from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.load import write_machine
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.effects.registry import definition_entry
 from spindle_fem.inference.belief import Belief
@@ -15,44 +18,83 @@ from spindle_fem.inference.coordinate_names import (
     MISDESCRIBED_IN_PREFIX,
     MISDESCRIBED_PREFIX,
     OF_ONE_RECORDING,
+    PROBE_PREFIX,
 )
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import candidate_values
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import slow_error_of
 from spindle_fem.model.lumped.written_network import value_in_definition
 from spindle_fem.units import Uncertain
 
 
-def _without_directions(diagnosis: Diagnosis) -> Fit:
-    """The chosen set on the machine as its definition can be written."""
-    if not diagnosis.predictor.misdescribed:
-        return diagnosis.stated_fit
-    predictor, belief = diagnosis.predictor.misdescribed_by((), {}), diagnosis.stated_fit.known
-    of_directions = (MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)
-    kept = [i for i, item in enumerate(belief.coordinates) if not item.name.startswith(of_directions)]
-    covariance = np.linalg.inv(belief.root.T @ belief.root)[np.ix_(kept, kept)]
-    root = np.linalg.cholesky(np.linalg.inv(covariance)).T
-    known = Belief(tuple(belief.coordinates[i] for i in kept), belief.mean[kept], root)
-    slow, fit = diagnosis.calibrated.slow, diagnosis.stated_fit
+def _has_its_place(item: Misdescription, spec: MachineSpec) -> bool:
+    """Whether a direction belongs to recording or sensor, or is one that a definition can hold."""
+    if item.recording is not None or item.of_sensor:
+        return True
+    return hasattr(item.change, "corrected") and item.change.corrected(spec, item.sigma) is not spec
+
+
+def _as_defined(belief: Belief, kept: list[int]) -> Belief:
+    """What is known of the kept coordinates if the others are as the definition says."""
+    dropped = np.setdiff1d(np.arange(len(belief.coordinates)), kept)
+    precision = belief.root.T @ belief.root
+    own = precision[np.ix_(kept, kept)]
+    moved = np.linalg.solve(own, precision[np.ix_(kept, dropped)] @ belief.mean[dropped])
+    return replace(
+        belief,
+        coordinates=tuple(belief.coordinates[i] for i in kept),
+        mean=belief.mean[kept] + moved,
+        root=np.linalg.cholesky(own).T,
+        begin=None if belief.begin is None else belief.begin[kept],
+    )
+
+
+def _as_written(diagnosis: Diagnosis, machine: DiagnosedMachine) -> tuple[Predictor, Fit]:
+    """The chosen set on the machine as its definition can be written, fitted once more.
+
+    Of a network that is without directions of misdescription. Of a machine with geometry those remain that
+    have a key to be corrected, or that belong to a recording or a sensor; lengths, films along the channel
+    and places of probes are as defined, and the parameters take what they can of them.
+    """
+    predictor, fit = diagnosis.predictor, diagnosis.stated_fit
+    if not predictor.misdescribed:
+        return predictor, fit
+    directions: tuple[Misdescription, ...] = ()
+    if machine.is_network:
+        predictor = predictor.misdescribed_by((), {})
+    else:
+        directions = tuple(d for d in predictor.misdescribed if _has_its_place(d, machine.spec))
+        predictor = with_misdescriptions(predictor, directions, fit.values, fit.candidates)
+    written = {item.coordinate for item in directions}
+    closed = (MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX, *(() if machine.is_network else (PROBE_PREFIX,)))
+    kept = [
+        index
+        for index, item in enumerate(fit.known.coordinates)
+        if item.name in written or not item.name.startswith(closed)
+    ]
+    known = _as_defined(fit.known, kept)
+    slow = diagnosis.calibrated.slow
     # The part explained by directions is slow error now: the second fit knows its size.
     for _ in range(2):
         problem = Problem(predictor, known, slow, predictor.observations)
         fit = problem.fit(fit.candidates, fit.values)
         slow = slow_error_of(problem, fit)
-    return fit
+    return predictor, fit
 
 
 def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     """Text of the definition with the fitted parameters and an ``[[effect]]`` for each finding.
 
-    Parameters keep their remaining uncertainty. Directions of misdescription
-    that correspond to a key of the definition are corrected; the position of a probe
-    in its hole is left as defined. No key corresponds to those of
-    a network: its parameters are fitted once more, without them.
+    Parameters keep their remaining uncertainty. Directions of misdescription that correspond to a key of the
+    definition are corrected; what no key corresponds to, and the position of a probe in its hole, is left as
+    defined, and the parameters are fitted once more without it.
     """
-    fit = _without_directions(diagnosis) if machine.is_network else diagnosis.stated_fit
+    predictor, fit = _as_written(diagnosis, machine)
     values = fit.values
     told = {name: state.candidate for name, state in diagnosis.states.items()}
     candidates = [told.get(item.amplitude, item) for item in fit.candidates]
@@ -67,7 +109,7 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     }
     if not machine.is_network:
         spec = with_parameters(machine.spec, {name: value for name, (value, _) in own.items()})
-        for item in diagnosis.predictor.misdescribed:
+        for item in predictor.misdescribed:
             if hasattr(item.change, "corrected"):
                 spec = item.change.corrected(spec, values[item.coordinate])
         return write_machine(spec.model_copy(update={"effects": (*machine.spec.effects, *entries)}))

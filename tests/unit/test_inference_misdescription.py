@@ -22,6 +22,7 @@ from spindle_fem.inference.heat_misdescriptions import (
 )
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.improved_machine import improved_machine
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.misdescription_content import misdescription_content
@@ -30,9 +31,11 @@ from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
 from spindle_fem.inference.verdict import Judgement, Ranked
 from spindle_fem.inference.wrong_definition import WIDER, with_wrong_definition, wrong_direction
+from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.report.diagnosis_tables import misdescription_blocks
 from spindle_fem.report.diagnosis_words import verdict_sentence
 from tests.support.diagnosed_spindle import TIMES, Case, written
+from tests.support.lumped_spindle import lumped_model
 
 FRONT = ("F1", "F2", "F3")
 SHAPE = "heat_shape.front.1"
@@ -138,6 +141,35 @@ def test_the_improved_machine_has_the_table_put_right(case):
     np.testing.assert_allclose(after.heat["R1"], before.heat["R1"])
     factor = 1.0 + share * np.array(before.speed) / 1000.0
     np.testing.assert_allclose(after.heat["F1"], factor * np.array(before.heat["F1"]))
+
+
+def test_the_improved_machine_takes_up_what_its_definition_cannot_hold(case, predictor, tmp_path):
+    def more_heat(base):
+        """As a factor on the heat, which is a parameter, but without a key of its own."""
+        return SpeedShape(FRONT, *ALWAYS)(base)
+
+    true = predictor.predict(0, {"heat.front": 1.15}).temperature
+    read = np.array([np.interp(TIMES, predictor.drives[0].grid, column) for column in true.T]).T
+    noise = np.random.default_rng(3).normal(0.0, 0.05, read.shape)
+    recorded = Predictor(case.fast, [written(tmp_path, read - 273.15 + noise)])
+    wide = Misdescription("more_heat", "", "", 0.3, "", more_heat)
+    recorded = with_misdescriptions(recorded, [wide])
+    calibrated = calibrate(None, recorded)
+    fit = Problem(recorded, calibrated.belief, EXPECTED_SLOW, recorded.observations).fit()
+    assert fit.values["heat.front"] < 1.08  # the rest is the direction's
+    diagnosis = SimpleNamespace(
+        predictor=recorded,
+        stated_fit=fit,
+        states={},
+        calibrated=calibrated,
+        machine_coordinates=calibrated.belief.coordinates,
+    )
+    path = tmp_path / "improved.toml"
+    path.write_text(improved_machine(diagnosis, SimpleNamespace(is_network=False, spec=case.spec)))
+    spec = load_machine(path)
+    again = Predictor(fast_spindle(lumped_model(spec), spec), recorded.recordings).predict(0, {}).temperature
+    plain = predictor.predict(0, {}).temperature
+    assert np.sqrt(np.mean((again - true) ** 2)) < 0.1 * np.sqrt(np.mean((plain - true) ** 2))
 
 
 def test_a_channel_without_calibration_is_known_as_before(case, predictor):

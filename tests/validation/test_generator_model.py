@@ -15,8 +15,8 @@ from validation.stepping import Drive, bearing_heat, draw_as_built, nominal_mach
 FOLDER = Path(__file__).parents[2] / "validation"
 # What diagnoses cases, holds results against answers or draws them; nothing that makes cases is among them.
 CALL_THE_PROGRAM = (
-    "run_study", "riddle", "reliability", "calibration_coverage", "plan_check", "watch_delay", "causes",
-    "proof_pictures", "solid_growth", "calculix",
+    "run_study", "riddle", "reliability", "calibration_coverage", "plan_check", "kept_back", "watch_delay",
+    "causes", "proof_pictures", "solid_growth", "calculix",
 )  # fmt: skip
 
 
