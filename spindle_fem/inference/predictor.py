@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, Reading
+from spindle_fem.effects.framework.sensor import as_felt
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.inference.coordinate_names import (
     DIRECTIONS,
@@ -93,13 +94,12 @@ class Predictor:
         self.is_network = fast.network is not None
         self.drives = tuple(self._drive(item) for item in self.recordings) if drives is None else drives
         left_open = not (self.is_network or at_stamps)
+        pairs = list(zip(self.recordings, self.drives, strict=True))
+        self._felt = [as_felt(item, effects.readings, inputs_at(drive, item.times)) for item, drive in pairs]
         self._initial = [
-            fast.inputs.initial_parameters(item) if self.is_network else () for item in self.recordings
+            fast.inputs.initial_parameters(item) if self.is_network else () for item in self._felt
         ]
-        self._jumps = [
-            unseen_jumps(item, drive) if left_open else ()
-            for item, drive in zip(self.recordings, self.drives, strict=True)
-        ]
+        self._jumps = [unseen_jumps(item, drive) if left_open else () for item, drive in pairs]
         self._gaps = [() if at_stamps else gap_pieces(item) for item in self.recordings]
         self._hidden = [
             hidden_in(recording, gaps, [group.name for group in fast.spec.bearing_set]) if left_open else ()
@@ -266,7 +266,7 @@ class Predictor:
         """Initial state of a recording: a uniform temperature [K], or that of every node of a network."""
         if self.is_network:
             return self.fast.inputs.start(
-                self.recordings[number],
+                self._felt[number],
                 self.drives[number],
                 self._factors(number, values, (), ()),
                 derivatives,
@@ -275,7 +275,7 @@ class Predictor:
             )
         if self.fast.spec.initial == "ambient":
             return self.drives[number].first("ambient")
-        return float(np.mean(list(self.recordings[number].first_readings().values())))
+        return float(np.mean(list(self._felt[number].first_readings().values())))
 
     def _factors(
         self, number: int, values: Mapping[str, float], known: Sequence[str], readings: Sequence[str]

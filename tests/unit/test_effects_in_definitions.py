@@ -11,6 +11,7 @@ from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.load import find_machine, load_machine, read_definition, validate, write_machine
 from spindle_fem.definition.network_load import validate_network_machine, write_network_machine
 from spindle_fem.effects.framework.effect import Candidate, Reading
+from spindle_fem.effects.framework.sensor import as_felt
 from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.errors import FaultsError
 from spindle_fem.inference.predictor import Predictor
@@ -210,6 +211,27 @@ def test_factors_of_effects_multiply_those_of_the_machine():
     }
     assert NO_EFFECTS.times_parameters({"a": 2.0}) == {"a": 2.0}
     assert active_effects((), SimpleNamespace()) == NO_EFFECTS
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        'effect = "sensor_gain"\nparameters = {gain = 0.5}',
+        'effect = "sensor_offset"\nparameters = {offset = "1.5 K"}',
+        'effect = "sensor_lag"\nparameters = {time_constant = "200 s"}',
+    ],
+)
+def test_a_sensor_that_lies_begins_with_its_first_reading(tmp_path, recording, entry):
+    """The node starts from what it must have felt."""
+    told = simulated(tmp_path, recording, f'{NETWORK}\n[[effect]]\ncomponent = "body"\n{entry}\n')
+    assert told.predicted[0] == pytest.approx(recording.temperature[0])
+
+
+def test_a_sensor_that_reads_the_air_says_nothing_of_its_place(recording):
+    air = Halved()
+    air.channel, air.parameters = "T_body", (TermParameter("gain", 0.0),)
+    told = as_felt(recording, [air], {"ambient": np.full(recording.times.size, 294.15)})
+    assert set(told.first_readings()) == {"winding"}
 
 
 IMPROVED = """

@@ -4,13 +4,51 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reading
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import TermParameter
+from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.channel_checks import Flag
 
 # Parts of a form: parameters with the amplitude first, reference, starts.
 Form = tuple[tuple[TermParameter, ...], float, Sequence[Mapping[str, float]]]
+
+# A sensor that shows less than this share of a change says nothing of the temperature at its place.
+LEAST_SHOWN = 0.1
+
+
+def as_felt(
+    recording: Recording, readings: Sequence[Reading], inputs: Mapping[str, NDArray[np.float64]]
+) -> Recording:
+    """A recording with the temperatures that its sensors must have felt, if they read as known.
+
+    A sensor that answers late is taken to have felt what it shows. Where one shows next to nothing of its
+    place, its temperature is not known.
+
+    Parameters
+    ----------
+    inputs : mapping of str to (N,) ndarray
+        At the stamps of the recording.
+    """
+    temperature, flags = recording.temperature.copy(), recording.flags.copy()
+    for reading in readings:
+        if reading.channel not in recording.temperature_names:
+            continue
+        column = recording.temperature_names.index(reading.channel)
+        own = {item.name: np.full(2, item.value, dtype=complex) for item in reading.parameters}
+        # Affine in the temperature at the place, which is first taken to be 0 K and then 1 K throughout.
+        none = np.tile(np.array([0.0, 1.0], dtype=complex), (recording.times.size, 1))
+        shown = reading.read(recording.times, none, inputs, own).real
+        share = shown[:, 1] - shown[:, 0]
+        blind = share < LEAST_SHOWN
+        flags[blind, column] |= np.uint8(Flag.MISSING)
+        temperature[:, column] = (temperature[:, column] - shown[:, 0]) / np.where(blind, 1.0, share)
+    return replace(recording, temperature=temperature, flags=flags)
 
 
 class ChannelReading(Reading):
