@@ -22,13 +22,14 @@ from spindle_fem.inference.coordinate_names import (
 )
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import candidate_values
-from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import slow_error_of
 from spindle_fem.model.lumped.written_network import value_in_definition
+from spindle_fem.results.run_log import LOGGER
 from spindle_fem.units import Uncertain
 
 
@@ -59,31 +60,33 @@ def _as_written(diagnosis: Diagnosis, machine: DiagnosedMachine) -> tuple[Predic
 
     Of a network that is without directions of misdescription. Of a machine with geometry those remain that
     have a key to be corrected, or that belong to a recording or a sensor; lengths, films along the channel
-    and places of probes are as defined, and the parameters take what they can of them.
+    and places of probes are as defined, and the parameters take what they can of them. Where that cannot be
+    simulated the fit stands as it is, which the log says.
     """
     predictor, fit = diagnosis.predictor, diagnosis.stated_fit
     if not predictor.misdescribed:
         return predictor, fit
     directions: tuple[Misdescription, ...] = ()
-    if machine.is_network:
-        predictor = predictor.misdescribed_by((), {})
-    else:
+    if not machine.is_network:
         directions = tuple(d for d in predictor.misdescribed if _has_its_place(d, machine.spec))
-        predictor = with_misdescriptions(predictor, directions, fit.values, fit.candidates)
     written = {item.coordinate for item in directions}
-    closed = (MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX, *(() if machine.is_network else (PROBE_PREFIX,)))
+    closed = (MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX, PROBE_PREFIX)
     kept = [
         index
         for index, item in enumerate(fit.known.coordinates)
         if item.name in written or not item.name.startswith(closed)
     ]
-    known = _as_defined(fit.known, kept)
-    slow = diagnosis.calibrated.slow
-    # The part explained by directions is slow error now: the second fit knows its size.
-    for _ in range(2):
-        problem = Problem(predictor, known, slow, predictor.observations)
-        fit = problem.fit(fit.candidates, fit.values)
-        slow = slow_error_of(problem, fit)
+    known, slow = _as_defined(fit.known, kept), diagnosis.calibrated.slow
+    try:
+        predictor = with_misdescriptions(predictor, directions, fit.values, fit.candidates)
+        # The part explained by directions is slow error now: the second fit knows its size.
+        for _ in range(2):
+            problem = Problem(predictor, known, slow, predictor.observations)
+            fit = problem.fit(fit.candidates, fit.values)
+            slow = slow_error_of(problem, fit)
+    except NOT_SIMULATED as error:
+        LOGGER.warning("improved_machine.toml lacks what its definition cannot hold of the fit: %s", error)
+        return diagnosis.predictor, diagnosis.stated_fit
     return predictor, fit
 
 

@@ -35,6 +35,8 @@ def as_felt(
     inputs : mapping of str to (N,) ndarray
         At the stamps of the recording.
     """
+    if not readings:
+        return recording
     temperature, flags = recording.temperature.copy(), recording.flags.copy()
     for reading in readings:
         if reading.channel not in recording.temperature_names:
