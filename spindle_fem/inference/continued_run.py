@@ -12,6 +12,7 @@ from spindle_fem.errors import SpecError
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import NO_VALUES, run_name
 from spindle_fem.inference.drive_steps import coarse_drive
+from spindle_fem.inference.heat_misdescriptions import clock_change
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import direction_columns, misdescriptions_of
 from spindle_fem.inference.observations import Observation, observe
@@ -122,9 +123,18 @@ class ContinuedRun:
         self._run: TransientRun | None = None
 
     def begins(self, piece: Recording) -> Predictor:
-        """The machine where a recording begins with this piece."""
+        """The machine where a recording begins with this piece.
+
+        Of what belongs to a recording its clock alone is the same in later pieces: courses of a room, heat
+        within gaps and coolant that stood begin anew with each.
+        """
         found = _Piece(self.fast, piece, self.effects, None)
-        return found.misdescribed_by(misdescriptions_of(found), {})
+        lasting = [
+            item
+            for item in misdescriptions_of(found)
+            if item.recording is None or item.change is clock_change
+        ]
+        return found.misdescribed_by(lasting, {})
 
     def follow(
         self, piece: Recording, values: Mapping[str, float], names: Sequence[str], width: float

@@ -16,6 +16,7 @@ from spindle_fem.inference.cumulative_sums import CumulativeSums, level_for, run
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.innovations import InnovationFilter
 from spindle_fem.inference.misdescription_columns import PROVIDERS
+from spindle_fem.inference.opened_machine import open_machine
 from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.watched_machine import WatchedMachine
@@ -214,6 +215,18 @@ def test_pieces_of_a_run_are_the_run(fast, tmp_path, monkeypatch, providers):
     before = run.begun[0].copy()
     run.move({name: 0.01, names[-1]: 1.0})
     assert run.begun[0] - before == pytest.approx(0.01 * run.begun[1][name], abs=1e-12)
+
+
+def test_a_room_that_is_not_recorded_has_no_course_of_its_own_in_every_piece(folder, tmp_path):
+    text = MACHINE.replace('temperature = "ambient"', 'temperature = {low = "15 degC", high = "25 degC"}')
+    (tmp_path / "machine.toml").write_text(text)
+    how = Watching(calibrate=(folder / "sound",), until_end=True)
+    assert list(watch_recording(tmp_path / "machine.toml", folder / "leaves", how))
+    opened = open_machine(tmp_path / "machine.toml", (), [read_recording(folder / "sound")], ())
+    begun = ContinuedRun(opened.fast, NO_EFFECTS).begins(opened.recordings[0])
+    every = misdescription_columns.misdescriptions_of(begun)
+    assert {d.name for d in every if d.recording is not None} > {"clock", "course.ambient.1"}
+    assert {d.name for d in begun.misdescribed if d.recording is not None} == {"clock"}
 
 
 # -------------------------------------------------------------------------------------- machine
