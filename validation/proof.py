@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
 
 from . import riddle
 from .causes import OPEN, SPINDLE, read_causes, study_seed
@@ -70,7 +71,23 @@ def read_study(study: Path, results: Path) -> dict[str, Any]:
         "rows": rows,
         **figures_of(rows),
         "causes": causes_of(rows, study_seed(study), generator),
+        **rounded({"kept_back": kept_back(results), "plan": planned(results)}),
     }
+
+
+def kept_back(results: Path) -> dict[str, Any] | None:
+    """What improved machines leave of further runs over noise and structure (:mod:`validation.kept_back`)."""
+    table = results / "kept_back" / "kept_back.json"
+    if not table.exists():
+        return None
+    ratios = [row["over_noise"] for row in json.loads(table.read_text(encoding="utf-8"))]
+    return {"of": len(ratios), "median": float(np.median(ratios)), "p90": float(np.quantile(ratios, 0.9))}
+
+
+def planned(results: Path) -> dict[str, Any] | None:
+    """Whether effects that a plan tells apart were named (:mod:`validation.plan_check`)."""
+    table = results / "plan_check.json"
+    return json.loads(table.read_text(encoding="utf-8"))["summary"] if table.exists() else None
 
 
 def causes_of(rows: list[dict[str, Any]], seed: int | None, generator: str) -> dict[str, dict[str, str]]:
