@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, Reading
-from spindle_fem.effects.framework.sensor import as_felt
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.inference.coordinate_names import (
     DIRECTIONS,
@@ -95,7 +94,7 @@ class Predictor:
         self.drives = tuple(self._drive(item) for item in self.recordings) if drives is None else drives
         left_open = not (self.is_network or at_stamps)
         pairs = list(zip(self.recordings, self.drives, strict=True))
-        self._felt = [as_felt(item, effects.readings, inputs_at(drive, item.times)) for item, drive in pairs]
+        self._felt = [effects.felt(item, drive) for item, drive in pairs]
         self._initial = [
             fast.inputs.initial_parameters(item) if self.is_network else () for item in self._felt
         ]

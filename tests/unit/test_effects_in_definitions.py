@@ -213,17 +213,16 @@ def test_factors_of_effects_multiply_those_of_the_machine():
     assert active_effects((), SimpleNamespace()) == NO_EFFECTS
 
 
-@pytest.mark.parametrize(
-    "entry",
-    [
-        'effect = "sensor_gain"\nparameters = {gain = 0.5}',
-        'effect = "sensor_offset"\nparameters = {offset = "1.5 K"}',
-        'effect = "sensor_lag"\nparameters = {time_constant = "200 s"}',
-    ],
-)
-def test_a_sensor_that_lies_begins_with_its_first_reading(tmp_path, recording, entry):
+GAIN = 'effect = "sensor_gain"\nparameters = {gain = 0.5}'
+OFFSET = 'effect = "sensor_offset"\nparameters = {offset = "1.5 K"}'
+LATE = 'effect = "sensor_lag"\nparameters = {time_constant = "200 s"}'
+
+
+@pytest.mark.parametrize("entries", [(GAIN,), (OFFSET,), (LATE,), (GAIN, OFFSET)])
+def test_a_sensor_that_lies_begins_with_its_first_reading(tmp_path, recording, entries):
     """The node starts from what it must have felt."""
-    told = simulated(tmp_path, recording, f'{NETWORK}\n[[effect]]\ncomponent = "body"\n{entry}\n')
+    effects = "".join(f'[[effect]]\ncomponent = "body"\n{entry}\n' for entry in entries)
+    told = simulated(tmp_path, recording, NETWORK + effects)
     assert told.predicted[0] == pytest.approx(recording.temperature[0])
 
 

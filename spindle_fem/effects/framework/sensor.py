@@ -32,13 +32,13 @@ def as_felt(
 
     Parameters
     ----------
+    readings : sequence of Reading
+        In the order in which a temperature passes through them.
     inputs : mapping of str to (N,) ndarray
         At the stamps of the recording.
     """
-    if not readings:
-        return recording
     temperature, flags = recording.temperature.copy(), recording.flags.copy()
-    for reading in readings:
+    for reading in reversed(readings):
         if reading.channel not in recording.temperature_names:
             continue
         column = recording.temperature_names.index(reading.channel)

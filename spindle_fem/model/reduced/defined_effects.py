@@ -10,6 +10,7 @@ from spindle_fem.definition.effect_entries import EffectEntry
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Candidate, Reading
 from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.sensor import as_felt
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.effects.registry import build, effect_of
 from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError
@@ -18,6 +19,7 @@ from spindle_fem.machine.view.machine_names import MachineNames
 from spindle_fem.machine.view.place_names import GROWTH
 from spindle_fem.model.lumped.network_view import day_of_a_network, view_of_network
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
+from spindle_fem.model.reduced.drive import Drive, inputs_at
 from spindle_fem.operation.preload_mechanics import machine_view
 from spindle_fem.recordings.align import Recording
 
@@ -58,6 +60,12 @@ class ActiveEffects:
             for parameter in item.factors:
                 found[parameter.name] = found.get(parameter.name, 1.0) * parameter.value
         return found
+
+    def felt(self, recording: Recording, drive: Drive) -> Recording:
+        """A recording of such a machine with what its sensors must have felt."""
+        if not self.readings:
+            return recording
+        return as_felt(recording, self.readings, inputs_at(drive, recording.times))
 
     def times_parameters(self, parameters: Mapping[str, float]) -> dict[str, float]:
         """Factors of a machine's parameters with those of the effects."""
