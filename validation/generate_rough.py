@@ -6,7 +6,7 @@ leaves them; answers count structure into ``noise.total_K``, by which effects ar
 """
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -106,8 +106,7 @@ def _place_names(component: str) -> list[str]:
 class Drawn:
     """One case before it is written: a machine, its sensors and runs, and what is concealed in it.
 
-    ``rng`` goes on where the draw ended; ``told`` are the arguments of the identification; ``left`` in K by
-    channel.
+    ``rng`` goes on where the draw ended; ``left`` in K by channel: what the refitted definition leaves of it.
     """
 
     rng: np.random.Generator
@@ -122,14 +121,23 @@ class Drawn:
     plans: list[Plan]
     truths: list[np.ndarray]
     left: np.ndarray
-    effects: list[Concealed]
-    told: tuple
+    effects: list[Concealed] = field(default_factory=list)
 
     @property
     def noise_and_structure_K(self) -> tuple[float, float]:
         """What sensors leave, and what the machine's shape leaves of the definition, each as RMS."""
         sensor = np.sqrt(self.sensors.total_K**2 + self.sensors.rounding_K**2 / 12.0)
         return float(sensor), float(np.sqrt((self.left**2).mean()))
+
+    def study(self, *open_to: Any) -> Study:
+        """The identification of what is concealed; directions that are open may be given."""
+        # Structural residuals are as slow as the loads: effects are judged against both.
+        slow = float(np.hypot(self.sensors.slow_K, self.noise_and_structure_K[1]))
+        judged_by = Noise(self.sensors.white_K, slow, STRUCTURE_S)
+        calibration = self.plans[1] if len(self.plans) > 1 else None
+        laws = (self.mounted,)
+        told = (self.model, self.plans[0], calibration, self.as_built, judged_by, laws, self.logger.channels)
+        return Study(*told, *open_to)
 
     def readings(self, plan: Plan) -> np.ndarray:
         """(n, channels) K that the sensors show in a run, with everything concealed."""
@@ -171,34 +179,16 @@ def _attempt(nominal: ReducedSpindle, pool: list, seeds: tuple[int, int, int]) -
     paths = [run(model, p.drive, as_built, (mounted,)) for p in plans]
     truths = [p.readings for p in paths]
     left = structure_left(nominal, plans, truths, (as_built, sensors, channels))
-    # Structural residuals are as slow as the loads: effects are judged against both.
-    structure = float(np.sqrt((left**2).mean()))
-    judged_by = Noise(sensors.white_K, float(np.hypot(sensors.slow_K, structure)), STRUCTURE_S)
-    calibration = plans[1] if len(plans) > 1 else None
-    told = (model, plans[0], calibration, as_built, judged_by, (mounted,), channels)
-    effects: list[Concealed] = []
+    machine = (deviation, model, mounted, as_built)
+    case = Drawn(rng, family, wanted, *machine, sensors, logger, plans, truths, left)
     if wanted:
-        study = Study(*told)
+        study = case.study()
         for _ in range(20):
             effects, _ = draw_stable(wanted, study, paths[0], plans[0], rng)
             if read_channels(effects, channels):
                 break
-    return Drawn(
-        rng,
-        family,
-        wanted,
-        deviation,
-        model,
-        mounted,
-        as_built,
-        sensors,
-        logger,
-        plans,
-        truths,
-        left,
-        effects,
-        told,
-    )
+        case = replace(case, effects=effects)
+    return case
 
 
 def make_case(
@@ -214,7 +204,7 @@ def make_case(
     name = f"case_{number:04d}"
     case = draw_case(nominal, pool, seed, number)
     effects, plans, logger, sensors = case.effects, case.plans, case.logger, case.sensors
-    known = what_is_known(Study(*case.told, what_is_open()), effects) if effects and identified else None
+    known = what_is_known(case.study(what_is_open()), effects) if effects and identified else None
     inputs, rest = folder / "inputs" / name, (sensors, case.rng, logger)
     rows = {"recording": record(inputs, "recording", name, plans[0], case.readings(plans[0]), *rest)}
     if len(plans) > 1:
