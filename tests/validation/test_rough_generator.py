@@ -5,7 +5,8 @@ import pytest
 
 from validation import machine
 from validation.finite_volume import assemble
-from validation.generate_rough import choose, make_case, with_twins
+from validation.generate_rough import choose, draw_case, make_case, with_twins
+from validation.kept_back import repeats, write_other_run
 from validation.machine import Deviation, build_grid
 from validation.reduction import load_reduced
 from validation.rough import AsMounted, draw_deviation
@@ -63,6 +64,23 @@ def test_case_says_what_structure_leaves(shapes, tmp_path):
     header = table.splitlines()[0].split(",")
     assert header[1 : 1 + len(answer["channels"])] == answer["channels"]
     assert 0.0 < max(answer["structure"]["refitted_residual_K"].values()) < 1.0
+
+
+@pytest.mark.slow
+def test_a_further_run_is_of_the_same_machine_in_another_cycle(shapes, tmp_path):
+    case = draw_case(shapes[0], [(SHAPE, shapes[1])], 4, 2)
+    times, shown = write_other_run(tmp_path / "case_0002", case, 4, 2)
+    assert (tmp_path / "case_0002" / "recording.toml").exists()
+    np.testing.assert_array_equal(write_other_run(tmp_path / "again", case, 4, 2)[1], shown)
+    first = case.readings(case.plans[0])
+    assert shown.shape != first.shape or np.abs(shown - first).max() > 1.0
+    assert times.size == len(shown)
+
+
+def test_what_belongs_to_the_hours_of_one_recording_is_not_repeated():
+    assert repeats({"effects": [{"effect": "mount_sink", "intervals": None}]})
+    assert not repeats({"effects": [{"effect": "unrecorded_cooling", "intervals": [[0.0, 60.0]]}]})
+    assert not repeats({"effects": [{"effect": "mount_sink"}, {"effect": "sensor_drift"}]})
 
 
 def test_families_come_in_turn():
