@@ -169,13 +169,19 @@ class Search:
         return recording.times, np.where(known, recording.temperature - at_stamps, np.nan)
 
     def interval_candidates(
-        self, fit: Fit, linear: LinearProblem | None = None
+        self, fit: Fit, linear: LinearProblem | None = None, like: Candidate | None = None
     ) -> Iterable[tuple[OnOff, Candidate]]:
         """Unrecorded heat or loss in intervals that explains what a fit leaves, the best spots first.
 
-        ``linear`` is the problem about the fit, where that is known.
+        ``linear`` is the problem about the fit, where that is known; with ``like`` only that effect at that
+        component.
         """
-        patterns = self.patterns()
+        patterns = [
+            (effect, pattern)
+            for effect, pattern in self.patterns()
+            if like is None
+            or (effect.name, self.view.component(pattern.spot)) == (like.effect, like.component)
+        ]
         found: list[tuple[IntervalEffect, OnOff]] = []
         for recording in range(len(self.problem.predictor.recordings)):
             answers: list[Onsets] = onset_answers(
@@ -277,7 +283,11 @@ class Search:
         return candidates, start
 
     def fit_all(
-        self, tasks: Sequence[Task], again: bool = False, reach: float = tuned.HOPELESS_SCORE
+        self,
+        tasks: Sequence[Task],
+        again: bool = False,
+        reach: float = tuned.HOPELESS_SCORE,
+        anew: bool = False,
     ) -> None:
         """Fit the sets that are not known yet, some at a time side by side, and keep them.
 
@@ -289,12 +299,14 @@ class Search:
             Whether to fit known sets again that begin with less misfit than they ended with.
         reach : float
             Deficit in log probability from which a set does not matter.
+        anew : bool
+            Whether to fit known sets again wherever they begin; what ends better is kept.
         """
         waiting: dict[frozenset, Task] = {}
         for candidates, start in tasks:
             key = identity(candidates)
             known = self.found.get(key)
-            if known is None or (again and self.problem.begins_better(known.fit, start)):
+            if known is None or anew or (again and self.problem.begins_better(known.fit, start)):
                 waiting.setdefault(key, (candidates, start))
         queue = list(waiting.values())
         rest = range(FITTED_FIRST, len(queue), FITTED_TOGETHER)
@@ -308,6 +320,9 @@ class Search:
             ):
                 # Sets that cannot be simulated explain nothing; their neighbours are tried.
                 if fitted is None or any(self._unseen(c, fitted.values) for c in candidates):
+                    continue
+                known = self.found.get(identity(candidates))
+                if known is not None and known.fit.misfit_with_prior <= fitted.misfit_with_prior:
                     continue
                 paid = sum(self._paid.get(identity((c,)), 0.0) for c in candidates)
                 self.keep(self.hypothesis(fitted, paid))

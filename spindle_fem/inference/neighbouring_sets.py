@@ -132,6 +132,22 @@ def at_other_spots(search: Search, fit: Fit, member: Candidate, rest: tuple[Cand
     return tasks
 
 
+def sought_again(search: Search, fit: Fit, event: Candidate) -> list[Task]:
+    """Fits from the intervals of one member in what the others leave, unless it has those already."""
+    rest = tuple(c for c in fit.candidates if c is not event)
+    known = search.found.get(identity(rest))
+    left = search.problem.fit(rest, fit.values) if known is None else known.fit
+    own = search.effects[event.effect].intervals(event, fit.values)
+    for found, candidate in search.interval_candidates(left, like=event):
+        if candidate.form == event.form:
+            instants = search.problem.predictor.drives[found.recording].grid[-1] / found.options
+            same = len(own) == len(found.intervals)
+            if same and np.allclose(own, found.intervals, rtol=0.0, atol=instants):
+                return []
+            return [search.task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): found})]
+    return []
+
+
 def _beside(search: Search, component: str) -> set[str]:
     """A component, the sets it belongs to, and in a network a node's links and a link's nodes."""
     found = {component, *_groups_of(search, component)}

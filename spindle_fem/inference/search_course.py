@@ -10,9 +10,9 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.hidden_states import without
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit
-from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search
+from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search, Task
 from spindle_fem.inference.input_sampling import left_over_noise
-from spindle_fem.inference.neighbouring_sets import exchanged, reduced, widened
+from spindle_fem.inference.neighbouring_sets import exchanged, reduced, sought_again, widened
 from spindle_fem.inference.state_search import add_states, settle_best, simulated
 from spindle_fem.inference.step_search import add_steps
 
@@ -60,6 +60,8 @@ def run_search(search: Search) -> list[Hypothesis]:
             screened, intervals = search.screened(hypothesis.fit)
             beside = not is_network and hypothesis is best
             search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS, beside=beside)
+    if not is_network:
+        _intervals_again(search)
     improve(search)
     # With geometry laws come first: fits take long there, and something that switches fits most of them.
     if not is_network and search.ranked()[0].fit.reduced_misfit > tuned.UNEXPLAINED_MISFIT**2:
@@ -82,6 +84,18 @@ def _beam(search: Search, best: Hypothesis, size: int) -> int:
     if not search.is_explained(best):
         return tuned.BEAM
     return int(size == 1 or (len(best.keys) == size and not search.problem.predictor.is_network))
+
+
+def _intervals_again(search: Search) -> None:
+    """Seek intervals again beside the laws that were found since: those hid when they begin."""
+    best = search.ranked()[0]
+    near = [h for h in search.ranked() if len(h.keys) > 1 and h.score > best.score - tuned.EXCHANGED_REACH]
+    tasks: list[Task] = []
+    for hypothesis in _different(search, near, signed=True)[: tuned.SETS_SOUGHT_AGAIN]:
+        events = [c for c in hypothesis.fit.candidates if search.in_intervals(c)]
+        if len(events) == 1:
+            tasks += sought_again(search, hypothesis.fit, events[0])
+    search.fit_all(tasks, anew=True)
 
 
 def _levels_beside(search: Search) -> None:
@@ -172,25 +186,36 @@ def to_extend(search: Search, ranked: Sequence[Hypothesis], number: int) -> list
     """The best hypothesis of each of the ``number`` best combinations of effects.
 
     Where all of them hold unrecorded heat, which fits almost anything, also the best that follows laws alone.
+    Heat in an interval and a loss in the rest of the time read alike until the other effects are known: where
+    one of them is chosen, so is the other.
     """
     different = _different(search, ranked)
     chosen = different[:number]
+    alike = {_combination(search, h) for h in chosen if not _only_laws(search, h)}
+    signed = _different(search, ranked, signed=True)
+    chosen += [h for h in signed if h not in chosen and _combination(search, h) in alike][:1]
     if chosen and not any(_only_laws(search, h) for h in chosen):
         chosen += [h for h in different if _only_laws(search, h)][:1]
     return chosen
 
 
-def _different(search: Search, ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The best hypothesis of each combination of effects.
-
-    One effect at several places, and what is on in intervals as heat or as
-    loss, are much the same start for a search.
-    """
+def _different(search: Search, ranked: Sequence[Hypothesis], signed: bool = False) -> list[Hypothesis]:
+    """The best hypothesis of each combination of effects, as :func:`_combination` has it."""
     found: dict[tuple[str, ...], Hypothesis] = {}
     for item in ranked:
-        names = ("intervals" if search.in_intervals(c) else c.effect for c in item.fit.candidates)
-        found.setdefault(tuple(sorted(names)), item)
+        found.setdefault(_combination(search, item, signed), item)
     return list(found.values())
+
+
+def _combination(search: Search, hypothesis: Hypothesis, signed: bool = False) -> tuple[str, ...]:
+    """Names of a set's effects in order.
+
+    One effect at several places, and what is on in intervals as heat or as
+    loss unless ``signed``, are much the same start for a search.
+    """
+    together = [not signed and search.in_intervals(c) for c in hypothesis.fit.candidates]
+    names = zip(together, hypothesis.fit.candidates, strict=True)
+    return tuple(sorted("intervals" if one else c.effect for one, c in names))
 
 
 def _only_laws(search: Search, hypothesis: Hypothesis) -> bool:

@@ -130,6 +130,8 @@ SETS_REDUCED = 3
 # Where the best set fits within the errors, an exchanged one so much less likely is not followed to its end.
 SETS_EXCHANGED, EFFECTS_EXCHANGED, OTHER_SPOTS = 1, 5, 3
 EXCHANGED_REACH = 30.0
+# Combinations of effects whose intervals are sought again beside the laws found since.
+SETS_SOUGHT_AGAIN = 8
 # Rounds of leaving out and exchanging, as long as each finds a better set.
 IMPROVEMENT_ROUNDS = 2
 # Shares of the amplitudes that a fit begins from, until it can be simulated: friction that feeds on its own

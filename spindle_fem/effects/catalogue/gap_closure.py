@@ -16,7 +16,7 @@ OVER_HOUSING, OVER_START = "ring over housing", "ring over start"
 
 
 class GapClosureTerm(Term):
-    """Factor ``1 - a (1 - s)`` on the seats; s follows ``S((x - x0)/w)`` with a lag, x is the ring's excess.
+    """Factor ``b (1 - a (1 - s))`` on seats; s follows ``S((x - x0)/w)`` with a lag, x is the ring's excess.
 
     Parameters
     ----------
@@ -51,12 +51,14 @@ class GapClosureTerm(Term):
             linear("closing_difference", 8.0, 5.0, "K", low=-5.0, high=60.0),
             shape("width", 5.0, 0.5, "K", low=0.3, high=40.0),
             shape("lag", 600.0, 0.4, "s", low=5.0, high=10000.0),
+            shape("closed", 1.0, 0.7, "", low=0.02, high=10.0),
         )
 
     def factor(self, context: TermContext) -> Complex:
         """Factor on the conductance of every seat, (n, k)."""
         closed = np.array([context.state[rings].mean(axis=0) for rings in self._closed_by])
-        return rows(context, *(1.0 - context.parameters["opening"] * (1.0 - closed)))
+        own = context.parameters
+        return rows(context, *(own["closed"] * (1.0 - own["opening"] * (1.0 - closed))))
 
     def advance(self, context: TermContext, step: float) -> Complex:
         """Closure of each seat, then reference excesses if counted from the start, (n or 2 n, k)."""
@@ -78,7 +80,8 @@ class GapClosure(Effect):
 
     Source: 5 µm of air conduct 0.026/5e-6 = 5000 W/(m²·K) at the most, and a
     loose ring touches on a small part; rings of 190 mm close 5 µm of
-    clearance on the diameter with 2 to 3 K (12e-6 1/K).
+    clearance on the diameter with 2 to 3 K (12e-6 1/K). What has closed by expanding
+    presses otherwise than the seat that was known before: it conducts b times as well.
     """
 
     name = "gap_closure"
@@ -91,10 +94,10 @@ class GapClosure(Effect):
     card = Card(
         group="Contacts and capacity",
         law=(
-            "conductance × 1 - a (1 - s), s follows S((x - x₀)/w) with a lag τ; x: each seat's outer ring"
+            "conductance × b (1 - a (1 - s)), s follows S((x - x₀)/w) with a lag τ; x: each seat's outer ring"
             " over the housing (a spacer's: the mean of their s), or all of them over their start"
         ),
-        size="a ± 1 (at most 0.995); x₀ 8 ± 5 K; w 5 K ×/÷ e^0.5; τ 600 s ×/÷ e^0.4",
+        size="a ± 1 (at most 0.995); x₀ 8 ± 5 K; w 5 K ×/÷ e^0.5; τ 600 s ×/÷ e^0.4; b 1 ×/÷ e^0.7",
         acts_on="outer seats of a set with their spacers, links between nodes",
         source="5 µm of air conduct 5000 W/(m²·K); 190 mm of steel close it with 2 to 3 K",
     )
