@@ -242,6 +242,9 @@ def test_a_seat_is_open_cold_and_closed_warm():
     assert factor(8.0, 1e6) == pytest.approx(1.0 - 0.95 / 2.0)
     assert factor(30.0, 1e6) == pytest.approx(1.0)
     assert factor(30.0, 600.0) == pytest.approx(1.0 - 0.95 * np.exp(-1.0))
+    own["closed"] = 0.4
+    assert factor(-10.0, 1e6) == pytest.approx(0.4 * 0.05)
+    assert factor(30.0, 1e6) == pytest.approx(0.4)
 
 
 def test_a_ring_remembers_where_it_began():

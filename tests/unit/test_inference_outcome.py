@@ -26,7 +26,7 @@ from spindle_fem.inference.mismatch_place import (
     smoothed_scores,
     where_of,
 )
-from spindle_fem.inference.neighbouring_sets import at_other_spots, exchanged
+from spindle_fem.inference.neighbouring_sets import at_other_spots, exchanged, sought_again
 from spindle_fem.inference.next_measurement import (
     EXISTING,
     Option,
@@ -143,6 +143,35 @@ def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
     assert len(others) < tuned.OTHER_SPOTS
     exchanged(search)
     assert search.ranked()[0].keys == {("unrecorded_heat_source", "front_bearings")}
+
+
+def test_intervals_are_sought_again_where_they_are_others(case, heated):
+    search = search_over(case, heated)
+    problem = search.problem
+    search.found = {}
+    search.keep(Hypothesis(problem.fit(), -1.0))
+    late, right = (
+        effect_of("unrecorded_heat_source").over(case.view, "front_bearings", [span])
+        for span in ((0.5 * (FROM + UNTIL), UNTIL), (FROM, UNTIL))
+    )
+    fit = problem.fit((late,), iterations=0)
+    ((members, start),) = sought_again(search, fit, late)
+    ((began, ended),) = effect_of("unrecorded_heat_source").intervals(members[0], start)
+    assert (began, ended) == (pytest.approx(FROM, abs=900.0), pytest.approx(UNTIL, abs=900.0))
+    # Fitted from there although it is known, and kept because it ends better.
+    search.keep(Hypothesis(fit, -1.0))
+    search.fit_all([(members, start)], anew=True)
+    assert search.ranked()[0].fit.misfit_with_prior < fit.misfit_with_prior
+    assert sought_again(search, problem.fit((right,)), right) == []
+
+
+def test_a_loss_is_extended_beside_the_heat_that_it_reads_like(case, heated):
+    search = search_over(case, heated)
+    heat, law = heated.hypotheses[:2]
+    loss = effect_of("unrecorded_cooling").over(case.view, "housing", [(0.0, FROM)])
+    loss = Hypothesis(search.problem.fit((loss,), iterations=0), -1.0)
+    assert search_course.to_extend(search, [heat, law, loss], 1) == [heat, loss, law]
+    assert search_course.to_extend(search, [law, heat, loss], 1) == [law]
 
 
 def test_laws_are_extended_beside_a_way_out(case, heated):
