@@ -14,8 +14,7 @@ from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.input_sampling import error_over_noise, left_over_noise
 from spindle_fem.inference.observations import Observation
-from spindle_fem.inference.reading_noise import ChannelBins, Whitener
-from spindle_fem.inference.robust_size import huber
+from spindle_fem.inference.reading_noise import ChannelBins
 from spindle_fem.inference.state_search import InferredState
 from spindle_fem.inference.unseen_moments import unread_changes, unseen_moments
 
@@ -58,7 +57,8 @@ class FollowedReadings:
     ) -> None:
         self._plant, self._unchanged, self._final = final.predictor, plain.predictor, final
         self._slow = final.slow
-        self._whiteners = [Whitener(item.bins, final.slow) for item in self._plant.heldout]
+        self._held = Problem(final.predictor, final.belief, final.slow, self._plant.heldout)
+        self._held_unchanged = Problem(plain.predictor, final.belief, final.slow, self._plant.heldout)
         self._follow = follow
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
         self._followed: dict[int, tuple[Fit, Followed]] = {}
@@ -107,21 +107,14 @@ class FollowedReadings:
         return left_over_noise(self._plant, seen, values, followed.fit.values)
 
     def heldout_misfit(self, fit: Fit) -> float | None:
-        """Minus twice the logarithm of their likelihood but for a constant, with the best set's error.
+        """Minus twice the logarithm of their likelihood after the fitted ones, with the best set's error.
 
         With that of the calibration's readings: a fit that gives them up to tell others predicts less.
         """
-        if not self._whiteners:
+        if not self._plant.heldout:
             return None
-        return self._given_up(fit).misfit + sum(
-            float(np.sum(huber(white(item.values - predicted))))
-            for item, white, predicted in zip(
-                self._plant.heldout,
-                self._whiteners,
-                self._predicted_by_all(fit, self._plant.heldout),
-                strict=True,
-            )
-        )
+        held = self._held if fit.candidates else self._held_unchanged
+        return self._given_up(fit).misfit + held.averaged_misfit(self.followed(fit).fit)
 
     def _predicted_by_all(self, fit: Fit, seen: Sequence[Observation]) -> list[Array]:
         """Predicted readings with states and moments that follow all readings."""

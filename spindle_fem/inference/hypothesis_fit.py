@@ -226,6 +226,22 @@ class Problem:
         coordinates, position = self._begun(candidates, start)
         return _Objective(self, candidates, coordinates).at(position, None).cost
 
+    def averaged_misfit(self, fit: Fit) -> float:
+        """Minus twice the logarithm of the likelihood of these readings given those of a fit, but a constant.
+
+        Averaged over all values that the readings of the fit leave possible: what those do not tell must not
+        count against a set. To second order about the fit (Laplace's method).
+        """
+        objective = _Objective(self, fit.candidates, fit.coordinates)
+        point = objective.at(fit.position, None)
+        jacobian = objective.slopes(point).jacobian
+        rooted = np.sqrt(outlier_weight(point.residual))[:, None] * jacobian
+        before = np.linalg.inv(fit.covariance)
+        precision = before + rooted.T @ rooted
+        move = np.linalg.solve(precision, jacobian.T @ (outlier_weight(point.residual) * point.residual))
+        left = float(np.sum(huber(point.residual - jacobian @ move))) + float(move @ before @ move)
+        return left + float(np.linalg.slogdet(precision)[1] - np.linalg.slogdet(before)[1])
+
     def _begun(
         self, candidates: Sequence[Candidate], start: Mapping[str, float]
     ) -> tuple[tuple[Coordinate, ...], Array]:
