@@ -373,6 +373,21 @@ def test_marginal_likelihood_of_columns_is_that_of_the_whole_covariance(blank, t
     assert total == pytest.approx(read @ inverse @ read, rel=1e-7)
 
 
+def test_what_other_readings_say_is_the_evidence_that_they_add(blank, tmp_path):
+    predictor = synthetic(blank, tmp_path, 4, TRUTH)
+    belief = Belief.prior(calibrate(None, predictor).belief.coordinates)
+    first, second = (
+        tuple(item for item in predictor.observations if item.channel == channel) for channel in (0, 1)
+    )
+    one, other, both = (Problem(predictor, belief, QUIET, seen) for seen in (first, second, first + second))
+    fit = one.fit(exact=True)
+    together = both.fit((), fit.values, exact=True)
+    added = -2.0 * (together.log_evidence - fit.log_evidence)
+    assert other.averaged_misfit(fit) == pytest.approx(added, rel=0.02)
+    # At the fit alone they seem far less likely: the body's own capacity is not known from the winding.
+    assert other.cost_at((), fit.values) > 1.4 * added
+
+
 def test_what_calibration_told_is_the_belief_of_the_diagnosis(fast, blank, tmp_path):
     earlier = synthetic(blank, tmp_path, 11, TRUTH)
     calibrated = calibrate(earlier, blank)
