@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
@@ -332,6 +333,18 @@ def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:
     return {name: frozenset(family) for name, family in found.items()}
 
 
+def _of_each(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Sets without more than a few places and forms of one combination of effects, which hide the others."""
+    seen: Counter[tuple[str, ...]] = Counter()
+    found = []
+    for item in ranked:
+        names = tuple(sorted(c.effect for c in item.fit.candidates))
+        seen[names] += 1
+        if seen[names] <= tuned.REFITTED_OF_EACH:
+            found.append(item)
+    return found
+
+
 def _refit(
     problem: Problem,
     found: Sequence[Hypothesis],
@@ -348,7 +361,7 @@ def _refit(
     best = score[id(ranked[0])]
     chosen = [
         item
-        for position, item in enumerate(ranked[: tuned.REFITTED])
+        for position, item in enumerate(_of_each(ranked)[: tuned.REFITTED])
         if position < tuned.ALWAYS_REFITTED or score[id(item)] > best - tuned.NEGLIGIBLE_SCORE
     ]
     # The slow error has changed since the search: test again whether the best set needs each member.

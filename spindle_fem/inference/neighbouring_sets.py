@@ -59,7 +59,7 @@ def exchanged(search: Search) -> None:
     follows a law is tried in its place. Where it follows a recorded quantity it
     is tried at other spots too. To first order the forms of one law hardly differ: the others are tried in
     its place. Of a machine with geometry a sensor that lies shows what physics near it may do as well: any is
-    tried in its place.
+    tried in its place; and in the place of a law beside others, such as a drifting room, heat in intervals.
     """
     tasks: list[Task] = []
     own = {effect.name for effect in search.interval_effects}
@@ -93,6 +93,8 @@ def exchanged(search: Search) -> None:
                         or (is_spindle and member.kind == SENSOR != c.kind)
                     ),
                 )
+                if is_spindle and rest and not any(search.in_intervals(c) for c in rest):
+                    tasks += at_other_spots(search, hypothesis.fit, member, rest, of_each=1)
     explained = search.is_explained(search.ranked()[0])
     search.fit_all(tasks, reach=tuned.EXCHANGED_REACH if explained else tuned.HOPELESS_SCORE)
 
@@ -119,15 +121,25 @@ def _with_laws(
     ]
 
 
-def at_other_spots(search: Search, fit: Fit, member: Candidate, rest: tuple[Candidate, ...]) -> list[Task]:
-    """Fits with intervals at other spots, sought in what a set without one member leaves as it is."""
+def at_other_spots(
+    search: Search,
+    fit: Fit,
+    member: Candidate,
+    rest: tuple[Candidate, ...],
+    of_each: int = tuned.OTHER_SPOTS,
+) -> list[Task]:
+    """Fits with intervals at other spots, sought in what a set without one member leaves as it is.
+
+    At most ``of_each`` of heat and of loss, and ``tuned.OTHER_SPOTS`` in all.
+    """
     kept = {name: value for name, value in fit.values.items() if name not in member.parameters}
     left = search.problem.fit(rest, kept, iterations=0)
     tasks: list[Task] = []
     for found, candidate in search.interval_candidates(left):
         if len(tasks) == tuned.OTHER_SPOTS:
             break
-        if identity((*rest, candidate)) not in search.found:
+        alike = sum(members[-1].effect == candidate.effect for members, _ in tasks)
+        if alike < of_each and identity((*rest, candidate)) not in search.found:
             tasks.append(search.task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): found}))
     return tasks
 
