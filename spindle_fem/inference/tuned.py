@@ -193,8 +193,8 @@ LEAST_IMPROVEMENT = 0.03
 # Likewise of a set with events, from which on laws that leave little are not enough. (Consistent networks of
 # seeds 66 and 101: at most 0.17 in 21; states that had been missed there: 0.39 and 0.47.)
 IMPROVEMENT_OF_EVENTS = 0.25
-# Probability from which the first set alone is named.
-DECIDED = 0.75
+# Probability by evidence from which the first set alone is named, and that which is stated at least then.
+DECIDED, LIKELIER_RIGHT = 0.75, 0.5
 # Sets of as many effects are named together where their readings differ by less than this share of the noise
 # in every channel (root mean square), all readings are less than LEAST_HELDOUT_GAIN for the first, and
 # evidence gives the other the third. The second, a difference of misfits, bounds what is fitted again for

@@ -32,6 +32,7 @@ NOTHING_REASON = (
     "few recordings without anything missing are like this one, and no set is much likelier than nothing"
 )
 NEAR_REASON = "several sets read the same within the noise; what tells them apart is how exact their laws are"
+DOUBTED_REASON = "of recordings with known answers, sets with such evidence were right in less than half"
 CONTRADICTED_REASON = (
     "chance leaves recordings like this one less than once in a thousand, and no set of effects that makes "
     "them likelier predicts the readings that were held out"
@@ -355,13 +356,16 @@ def judge(
     )
     # What every likely set holds is sure, whether there is more or not.
     common = sum(item.probability for item in ranked if holds(item.fit, chosen.fit, known_as_one))
-    decided = common * (1.0 - nothing) >= tuned.DECIDED and not near
+    several = common * (1.0 - nothing) < tuned.DECIDED or bool(near)
+    decided = not several and known * evidence >= tuned.LIKELIER_RIGHT
     if decided:
         reason = ""
     elif nothing > 1.0 - tuned.DECIDED:
         reason = NOTHING_REASON
-    else:
+    elif several:
         reason = NEAR_REASON if near else SEVERAL_REASON
+    else:
+        reason = DOUBTED_REASON
     verdict: Verdict = kind_of(chosen.fit.candidates) if decided else "ambiguous"
     if rest > tuned.MOST_LEFT:
         before = left(empty.fit)
