@@ -333,7 +333,7 @@ def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:
     return {name: frozenset(family) for name, family in found.items()}
 
 
-def _of_each(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+def few_of_each(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Sets without more than a few places and forms of one combination of effects, which hide the others."""
     seen: Counter[tuple[str, ...]] = Counter()
     found = []
@@ -361,7 +361,7 @@ def _refit(
     best = score[id(ranked[0])]
     chosen = [
         item
-        for position, item in enumerate(_of_each(ranked)[: tuned.REFITTED])
+        for position, item in enumerate(few_of_each(ranked)[: tuned.REFITTED])
         if position < tuned.ALWAYS_REFITTED or score[id(item)] > best - tuned.NEGLIGIBLE_SCORE
     ]
     # The slow error has changed since the search: test again whether the best set needs each member.

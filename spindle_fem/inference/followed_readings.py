@@ -57,8 +57,11 @@ class FollowedReadings:
     ) -> None:
         self._plant, self._unchanged, self._final = final.predictor, plain.predictor, final
         self._slow = final.slow
-        self._held = Problem(final.predictor, final.belief, final.slow, self._plant.heldout)
-        self._held_unchanged = Problem(plain.predictor, final.belief, final.slow, self._plant.heldout)
+        self._held = [
+            Problem(predictor, final.belief, final.slow, self._plant.heldout)
+            for predictor in (plain.predictor, final.predictor)
+            if self._plant.heldout
+        ]
         self._follow = follow
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
         self._followed: dict[int, tuple[Fit, Followed]] = {}
@@ -111,9 +114,9 @@ class FollowedReadings:
 
         With that of the calibration's readings: a fit that gives them up to tell others predicts less.
         """
-        if not self._plant.heldout:
+        if not self._held:
             return None
-        held = self._held if fit.candidates else self._held_unchanged
+        held = self._held[bool(fit.candidates)]
         return self._given_up(fit).misfit + held.averaged_misfit(self.followed(fit).fit)
 
     def _predicted_by_all(self, fit: Fit, seen: Sequence[Observation]) -> list[Array]:

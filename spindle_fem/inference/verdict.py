@@ -32,7 +32,7 @@ NOTHING_REASON = (
     "few recordings without anything missing are like this one, and no set is much likelier than nothing"
 )
 NEAR_REASON = "several sets read the same within the noise; what tells them apart is how exact their laws are"
-DOUBTED_REASON = "of recordings with known answers, sets with such evidence were right in less than half"
+DOUBTED_REASON = "something else, or a law unlike those of the catalogue, is likelier than the best set"
 CONTRADICTED_REASON = (
     "chance leaves recordings like this one less than once in a thousand, and no set of effects that makes "
     "them likelier predicts the readings that were held out"

@@ -11,22 +11,17 @@ import pytest
 import xarray as xr
 
 from spindle_fem.definition.load import write_machine
-from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.errors import BadInputError
-from spindle_fem.inference import search_course, tuned
+from spindle_fem.inference import tuned
 from spindle_fem.inference.diagnosis import overlapping_components
 from spindle_fem.inference.findings import findings_of, noise_level, predictions_at_stamps, rmse
 from spindle_fem.inference.further_tests import AGAIN, answer, reachable_places, trials_of
-from spindle_fem.inference.hypothesis import Hypothesis
-from spindle_fem.inference.hypothesis_fit import Problem
-from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.mismatch_place import (
     main_component,
     significant_stretches,
     smoothed_scores,
     where_of,
 )
-from spindle_fem.inference.neighbouring_sets import at_other_spots, exchanged, sought_again
 from spindle_fem.inference.next_measurement import (
     EXISTING,
     Option,
@@ -36,7 +31,6 @@ from spindle_fem.inference.next_measurement import (
     pairwise_distances,
 )
 from spindle_fem.inference.prepared_problem import (
-    EXPECTED_SLOW,
     known_before,
 )
 from spindle_fem.inference.worker_processes import Workers
@@ -46,14 +40,9 @@ from spindle_fem.report.diagnosis_report import SCHEMA, draw_figures, write_diag
 from spindle_fem.report.diagnosis_tables import where_text
 from spindle_fem.report.diagnosis_words import place_named, verdict_sentence
 from tests.support.diagnosed_spindle import (
-    DRY_BEARING,
-    DRY_SET,
-    EVIDENCE,
     FROM,
     HEAT,
-    LOOSE,
     PROBES,
-    SEAT,
     TIMES,
     UNTIL,
     Case,
@@ -115,92 +104,6 @@ def test_probes_of_a_part_are_off_along_the_radius_together(heated):
     # What the probes share is no matter of the machine's parameters.
     rest = [i for i, name in enumerate(names) if not name.startswith("probe.")]
     assert covariance[np.ix_(rest, radial)] == pytest.approx(0.0)
-
-
-# ---------------------------------------------------------------------- search
-def search_over(case, diagnosis, kind=Search):
-    problem = Problem(
-        diagnosis.predictor, diagnosis.calibrated.belief, EXPECTED_SLOW, diagnosis.predictor.observations
-    )
-    effects = catalogue()
-    weights = dict.fromkeys(effects, 1.0)
-    candidates = candidates_for(case.view)
-    return kind(problem, case.view, effects, candidates, interval_effects(), weights, workers=Workers(1))
-
-
-def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
-    search = search_over(case, heated)
-    problem = search.problem
-    search.found = {}
-    wrong = effect_of("unrecorded_heat_source").over(case.view, "rear_bearings", [(FROM, UNTIL)])
-    for candidates in ((), (wrong,)):
-        search.keep(Hypothesis(problem.fit(candidates), -1.0))
-    found = max(search.ranked(), key=lambda h: len(h.fit.candidates))
-    (first, start), *others = at_other_spots(search, found.fit, wrong, ())
-    assert [c.component for c in first] == ["front_bearings"]
-    assert start[first[0].amplitude] == pytest.approx(HEAT, rel=0.3)
-    assert wrong.component not in {c.component for members, _ in others for c in members}
-    assert len(others) < tuned.OTHER_SPOTS
-    exchanged(search)
-    assert search.ranked()[0].keys == {("unrecorded_heat_source", "front_bearings")}
-
-
-def test_intervals_are_sought_again_where_they_are_others(case, heated):
-    search = search_over(case, heated)
-    problem = search.problem
-    search.found = {}
-    search.keep(Hypothesis(problem.fit(), -1.0))
-    late, right = (
-        effect_of("unrecorded_heat_source").over(case.view, "front_bearings", [span])
-        for span in ((0.5 * (FROM + UNTIL), UNTIL), (FROM, UNTIL))
-    )
-    fit = problem.fit((late,), iterations=0)
-    ((members, start),) = sought_again(search, fit, late)
-    ((began, ended),) = effect_of("unrecorded_heat_source").intervals(members[0], start)
-    assert (began, ended) == (pytest.approx(FROM, abs=900.0), pytest.approx(UNTIL, abs=900.0))
-    # Fitted from there although it is known, and kept because it ends better.
-    search.keep(Hypothesis(fit, -1.0))
-    search.fit_all([(members, start)], anew=True)
-    assert search.ranked()[0].fit.misfit_with_prior < fit.misfit_with_prior
-    assert sought_again(search, problem.fit((right,)), right) == []
-
-
-def test_a_loss_is_extended_beside_the_heat_that_it_reads_like(case, heated):
-    search = search_over(case, heated)
-    heat, law = heated.hypotheses[:2]
-    loss = effect_of("unrecorded_cooling").over(case.view, "housing", [(0.0, FROM)])
-    loss = Hypothesis(search.problem.fit((loss,), iterations=0), -1.0)
-    assert search_course.to_extend(search, [heat, law, loss], 1) == [heat, loss, law]
-    assert search_course.to_extend(search, [law, heat, loss], 1) == [law]
-
-
-def test_laws_are_extended_beside_a_way_out(case, heated):
-    search = search_over(case, heated)
-    out, law = heated.hypotheses[:2]
-    assert search_course.to_extend(search, [out, law], 1) == [out, law]
-    assert search_course.to_extend(search, [law, out], 1) == [law]
-
-
-class Tabled(Search):
-    """A search whose fits have the evidence of a table."""
-
-    def fit_all(self, tasks, again=False):
-        for candidates, values in tasks:
-            keys = frozenset((c.effect, c.component) for c in candidates)
-            fit = SimpleNamespace(
-                candidates=candidates, values=values, keys=keys, log_evidence=EVIDENCE.get(keys, -1e3)
-            )
-            self.keep(Hypothesis(fit, 0.0))
-
-
-def test_what_a_single_bearing_needed_beside_it_is_left_out_beside_its_set(case, heated, monkeypatch):
-    monkeypatch.setattr(search_course, "exchanged", lambda search: None)
-    search = search_over(case, heated, Tabled)
-    search.found = {}
-    for keys in ((DRY_BEARING, LOOSE), (DRY_BEARING, LOOSE, SEAT)):
-        search.fit_all([(tuple(case.candidates[key] for key in keys), {})])
-    search_course.improve(search)
-    assert search.ranked()[0].keys == {DRY_SET, LOOSE}
 
 
 # ----------------------------------------------------------------------- where

@@ -172,7 +172,8 @@ def test_a_set_that_does_not_predict_what_was_held_out_is_stated_no_higher_than_
     )
     assert well.chosen.probability > 0.9 > 0.11 > badly.chosen.probability
     assert badly.other == pytest.approx(1.0 - badly.chosen.probability)
-    assert badly.verdict == "missing_physics"
+    assert (well.verdict, badly.verdict) == ("missing_physics", "ambiguous")
+    assert "likelier than the best set" in badly.reason
     # as much as in what was fitted: no more than that says
     evenly, fitted = (
         {"left": lambda fit: 1.9, "beyond": lambda fit, r=r: r if fit.candidates else 8.0} for r in (1.9, 1.0)

@@ -99,7 +99,10 @@ def search(monkeypatch):
     monkeypatch.setattr(Search, "keep", lambda self, fit: self.found.update({"kept": fit}))
     problem = SimpleNamespace(begins_better=lambda fit, start: start["left"] < fit.misfit_with_prior)
     workers = SimpleNamespace(
-        fits=lambda problem, orders: [SimpleNamespace(values=dict(order.start)) for order in orders]
+        fits=lambda problem, orders: [
+            SimpleNamespace(values=dict(order.start), misfit_with_prior=order.start["left"])
+            for order in orders
+        ]
     )
     found = Search(problem, NotingSearch.view, {}, (), (), {}, workers=workers)
     found.found = {identity((BESIDE,)): SimpleNamespace(fit=SimpleNamespace(misfit_with_prior=50.0))}
@@ -112,3 +115,9 @@ def search(monkeypatch):
 def test_a_known_set_is_fitted_again_where_it_begins_with_less(search, left, again, fitted):
     search.fit_all([((BESIDE,), {"left": left})], again=again)
     assert ("kept" in search.found) is fitted
+
+
+@pytest.mark.parametrize(("left", "kept"), [(40.0, True), (60.0, False)])
+def test_a_known_set_is_fitted_anew_and_what_ends_better_is_kept(search, left, kept):
+    search.fit_all([((BESIDE,), {"left": left})], anew=True)
+    assert ("kept" in search.found) is kept

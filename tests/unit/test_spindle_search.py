@@ -1,0 +1,152 @@
+"""Steps of a search on a lumped spindle that was made to differ in a known way."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
+from spindle_fem.inference import search_course, tuned
+from spindle_fem.inference.diagnosis import few_of_each
+from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.hypothesis_search import Search
+from spindle_fem.inference.neighbouring_sets import at_other_spots, exchanged, sought_again
+from spindle_fem.inference.prepared_problem import EXPECTED_SLOW
+from spindle_fem.inference.worker_processes import Workers
+from tests.support.diagnosed_spindle import (
+    DRY_BEARING,
+    DRY_SET,
+    EVIDENCE,
+    FROM,
+    HEAT,
+    LOOSE,
+    SEAT,
+    UNTIL,
+    Case,
+)
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    return Case(tmp_path_factory.mktemp("lumped"))
+
+
+@pytest.fixture(scope="module")
+def heated(case):
+    """Front bearings get heat for a while that nobody wrote down; thermal preload may be it too."""
+    return case.diagnosis(
+        ("unrecorded_heat_source", "front_bearings"),
+        HEAT,
+        "ambiguous",
+        (("thermal_preload", "front_bearings"),),
+    )
+
+
+def search_over(case, diagnosis, kind=Search):
+    problem = Problem(
+        diagnosis.predictor, diagnosis.calibrated.belief, EXPECTED_SLOW, diagnosis.predictor.observations
+    )
+    effects = catalogue()
+    weights = dict.fromkeys(effects, 1.0)
+    candidates = candidates_for(case.view)
+    return kind(problem, case.view, effects, candidates, interval_effects(), weights, workers=Workers(1))
+
+
+def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
+    search = search_over(case, heated)
+    problem = search.problem
+    search.found = {}
+    wrong = effect_of("unrecorded_heat_source").over(case.view, "rear_bearings", [(FROM, UNTIL)])
+    for candidates in ((), (wrong,)):
+        search.keep(Hypothesis(problem.fit(candidates), -1.0))
+    found = max(search.ranked(), key=lambda h: len(h.fit.candidates))
+    (first, start), *others = at_other_spots(search, found.fit, wrong, ())
+    assert [c.component for c in first] == ["front_bearings"]
+    assert start[first[0].amplitude] == pytest.approx(HEAT, rel=0.3)
+    assert wrong.component not in {c.component for members, _ in others for c in members}
+    assert len(others) < tuned.OTHER_SPOTS
+    exchanged(search)
+    assert search.ranked()[0].keys == {("unrecorded_heat_source", "front_bearings")}
+
+
+def test_heat_in_intervals_is_tried_in_the_place_of_a_law_beside_others(case, heated):
+    search = search_over(case, heated)
+    seat, preload = (case.candidates[key] for key in (SEAT, ("thermal_preload", "front_bearings")))
+    search.found = {}
+    for candidates in ((), (seat,), (preload,), (seat, preload)):
+        score = 0.0 if len(candidates) == 2 else -1e4
+        search.keep(Hypothesis(search.problem.fit(candidates), score))
+    exchanged(search)
+    heat = ("unrecorded_heat_source", "front_bearings")
+    found = next(h for h in search.found.values() if h.keys == {SEAT, heat})
+    both = next(h for h in search.found.values() if h.fit.candidates == (seat, preload))
+    assert found.fit.misfit_with_prior < both.fit.misfit_with_prior
+
+
+def test_places_of_one_combination_hide_no_other():
+    def at(effect, place):
+        return SimpleNamespace(
+            fit=SimpleNamespace(candidates=(SimpleNamespace(effect=effect, component=place),))
+        )
+
+    ranked = [at("seal_friction", place) for place in "abcd"] + [at("windage", "shaft")]
+    kept = few_of_each(ranked)
+    assert kept == [*ranked[: tuned.REFITTED_OF_EACH], ranked[-1]]
+
+
+def test_intervals_are_sought_again_where_they_are_others(case, heated):
+    search = search_over(case, heated)
+    problem = search.problem
+    search.found = {}
+    search.keep(Hypothesis(problem.fit(), -1.0))
+    late, right = (
+        effect_of("unrecorded_heat_source").over(case.view, "front_bearings", [span])
+        for span in ((0.5 * (FROM + UNTIL), UNTIL), (FROM, UNTIL))
+    )
+    fit = problem.fit((late,), iterations=0)
+    ((members, start),) = sought_again(search, fit, late)
+    ((began, ended),) = effect_of("unrecorded_heat_source").intervals(members[0], start)
+    assert (began, ended) == (pytest.approx(FROM, abs=900.0), pytest.approx(UNTIL, abs=900.0))
+    # Fitted from there although it is known, and kept because it ends better.
+    search.keep(Hypothesis(fit, -1.0))
+    search.fit_all([(members, start)], anew=True)
+    assert search.ranked()[0].fit.misfit_with_prior < fit.misfit_with_prior
+    assert sought_again(search, problem.fit((right,)), right) == []
+
+
+def test_a_loss_is_extended_beside_the_heat_that_it_reads_like(case, heated):
+    search = search_over(case, heated)
+    heat, law = heated.hypotheses[:2]
+    loss = effect_of("unrecorded_cooling").over(case.view, "housing", [(0.0, FROM)])
+    loss = Hypothesis(search.problem.fit((loss,), iterations=0), -1.0)
+    assert search_course.to_extend(search, [heat, law, loss], 1) == [heat, loss, law]
+    assert search_course.to_extend(search, [law, heat, loss], 1) == [law]
+
+
+def test_laws_are_extended_beside_a_way_out(case, heated):
+    search = search_over(case, heated)
+    out, law = heated.hypotheses[:2]
+    assert search_course.to_extend(search, [out, law], 1) == [out, law]
+    assert search_course.to_extend(search, [law, out], 1) == [law]
+
+
+class Tabled(Search):
+    """A search whose fits have the evidence of a table."""
+
+    def fit_all(self, tasks, again=False):
+        for candidates, values in tasks:
+            keys = frozenset((c.effect, c.component) for c in candidates)
+            fit = SimpleNamespace(
+                candidates=candidates, values=values, keys=keys, log_evidence=EVIDENCE.get(keys, -1e3)
+            )
+            self.keep(Hypothesis(fit, 0.0))
+
+
+def test_what_a_single_bearing_needed_beside_it_is_left_out_beside_its_set(case, heated, monkeypatch):
+    monkeypatch.setattr(search_course, "exchanged", lambda search: None)
+    search = search_over(case, heated, Tabled)
+    search.found = {}
+    for keys in ((DRY_BEARING, LOOSE), (DRY_BEARING, LOOSE, SEAT)):
+        search.fit_all([(tuple(case.candidates[key] for key in keys), {})])
+    search_course.improve(search)
+    assert search.ranked()[0].keys == {DRY_SET, LOOSE}
