@@ -37,7 +37,7 @@ ROUNDING = 1e-9
 def misfit_seen(freedom: int, trials: int) -> float:
     """Expected gain in misfit (χ²) of an effect that is seen with ``POWER`` at ``FALSE_ALARM``.
 
-    The inverse of :func:`~spindle_fem.inference.verdict.detection_p_value`.
+    The inverse of :func:`~spindle_fem.inference.p_value.detection_p_value`.
 
     Parameters
     ----------

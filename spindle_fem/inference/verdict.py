@@ -23,6 +23,7 @@ from spindle_fem.inference.like_sets import (
     may_stand_for,
     with_needed_thirds,
 )
+from spindle_fem.inference.p_value import detection_p_value
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
 
 Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"]
@@ -39,8 +40,6 @@ CONTRADICTED_REASON = (
 )
 # Shift of an uncertain parameter that its prior holds with at least 1 %.
 PRIOR_SIGMAS = float(norm.ppf(0.995))
-# Name of the parameter of what swings that means nothing without the swing.
-PERIOD = "period"
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,58 +164,6 @@ def counted(gain: float) -> float:
     inside = min(max(gain, 0.0), ends)
     beyond = max(gain - ends, 0.0) / tuned.LARGEST_INEXACT_DIVISOR
     return float(tuned.INEXACT_BEYOND * np.log1p(inside / tuned.INEXACT_BEYOND) + beyond + min(gain, 0.0))
-
-
-def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int, coarseness: float = 1.0) -> float:
-    """Probability that some set of effects would improve a consistent recording as much.
-
-    Wilks' theorem for each set with its free parameters, but for periods, which
-    exist only with an effect: the gain is the largest of as many as a period is
-    known more closely than before (:func:`closer_periods`). The lowest level is
-    held against those of consistent recordings of concealed machines, with
-    Šidák's correction for as many trials as the candidates amount to. So a
-    small structural difference between model and machine, which the slow error
-    does not take up, is part of what chance does.
-
-    Parameters
-    ----------
-    hypotheses : sequence of Hypothesis
-        The empty one among them.
-    trials : int
-        Candidates that were tried.
-    coarseness : float
-        As :func:`tempered` has it.
-    """
-    null = next(h for h in hypotheses if not h.fit.candidates)
-    lowest = 0.0
-    likely = max((h.log_prior for h in hypotheses if len(h.fit.candidates) == 1), default=0.0)
-    for item in hypotheses:
-        freedom = len(item.fit.coordinates) - len(null.fit.coordinates)
-        gain = (1.0 - item.course_share) * (null.misfit - item.misfit)
-        if freedom and gain > 0.0:
-            # Pairs, and what is on in intervals, were chosen among so many more.
-            chosen_among = max(0.0, likely - item.log_prior)
-            periods, among = closer_periods(item.fit)
-            level = float(chi2.logsf(gain, max(1, freedom - periods))) + among
-            lowest = min(lowest, level + chosen_among)
-    if lowest == 0.0:
-        return 1.0
-    single = min(float(np.exp(lowest / (coarseness * tuned.CHANCE_DIVISOR))), 1.0 - 1e-16)
-    return float(-np.expm1((1.0 + trials / tuned.CANDIDATES_A_TRIAL) * np.log1p(-single)))
-
-
-def closer_periods(fit: Fit) -> tuple[int, float]:
-    """Number of fitted periods, and logarithm of how many times closer they are known than before.
-
-    As many swings of other periods would have been taken for this one by chance.
-    Source: Davies (1987), Biometrika 74, 33-43, for a size and a phase.
-    """
-    free = {name for c in fit.candidates for name, item in c.free.items() if item.name == PERIOD}
-    at = [place for place, c in enumerate(fit.coordinates) if c.name in free]
-    if not at:
-        return 0, 0.0
-    variances = np.diag(fit.covariance)[at]
-    return len(at), float(-0.5 * np.log(np.minimum(variances, 1.0)).sum())
 
 
 def within_prior(fit: Fit, calibrated: bool) -> bool:
@@ -400,7 +347,8 @@ def _predicts(
     """Whether held-out readings speak for a set: by themselves, or with what the fitted ones say.
 
     They are a third of the fitted ones, and of a small effect seen by few sensors tell less than its odds by
-    those. What they say against a set counts as well: the sum must be twenty to one.
+    those. What they say against a set counts as well: the sum must be twenty to one. A set that leaves as
+    much of all readings as nothing missing only makes the machine likelier, which is not enough.
     A coarse model leaves more than noise, so that likelihoods exaggerate: for a network the residual
     counts, that of fitted readings too, and sensors' white noise hides less of it. If the fit without effects
     leaves only noise, with directions far from their priors, a smaller residual does not count.
@@ -411,7 +359,11 @@ def _predicts(
         lower = beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
         return lower and left(chosen.fit) <= left(empty.fit)
     gain = _heldout_gain(chosen, empty)
-    return max(gain, gain + odds if coarseness == 1.0 else gain) >= tuned.LEAST_HELDOUT_GAIN
+    if coarseness > 1.0:
+        return gain >= tuned.LEAST_HELDOUT_GAIN
+    rest, before = (np.sqrt(3.0 * left(fit) ** 2 + beyond(fit) ** 2) for fit in (chosen.fit, empty.fit))
+    lower = rest <= (1.0 - tuned.LEAST_IMPROVEMENT) * before
+    return lower and max(gain, gain + odds) >= tuned.LEAST_HELDOUT_GAIN
 
 
 def _heldout_gain(chosen: Hypothesis, empty: Hypothesis) -> float:

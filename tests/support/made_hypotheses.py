@@ -51,6 +51,7 @@ def hypothesis(*candidates, misfit, evidence=None, log_prior=0.0, position=(), r
 
 
 def verdict(*found, calibrated=False, trials=100, overlapping=None, **more):
+    more.setdefault("left", lambda fit: 0.9 if fit.candidates else 1.0)
     return judge(list(found), trials=trials, calibrated=calibrated, overlapping=overlapping, **more)
 
 

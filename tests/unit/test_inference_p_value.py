@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.inference import tuned
-from spindle_fem.inference.verdict import detection_p_value
+from spindle_fem.inference.p_value import detection_p_value
 from tests.support.made_hypotheses import CHURNING, PRELOAD, candidate, hypothesis
 
 

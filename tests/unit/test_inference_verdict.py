@@ -181,6 +181,16 @@ def test_a_set_that_does_not_predict_what_was_held_out_is_stated_no_higher_than_
     assert verdict(*sets, **evenly).chosen.probability == verdict(*sets, **fitted).chosen.probability
 
 
+def test_a_set_that_leaves_as_much_as_nothing_missing_is_not_named():
+    sets = (
+        replace(hypothesis(misfit=1000.0), heldout=700.0),
+        replace(hypothesis(PRELOAD, misfit=950.0), heldout=680.0),
+    )
+    for less, named in ((0.985, "consistent"), (0.975, "missing_physics")):
+        told = verdict(*sets, left=lambda fit, less=less: less if fit.candidates else 1.0)
+        assert told.verdict == named
+
+
 def test_a_set_is_named_where_fitted_and_held_out_readings_together_speak_for_it():
     nothing, preload = replace(hypothesis(misfit=2000.0), heldout=700.0), hypothesis(PRELOAD, misfit=1900.0)
     first, last = rank([nothing, preload])
