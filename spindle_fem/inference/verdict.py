@@ -245,7 +245,7 @@ def judge(
     def predicts(item: Ranked) -> bool:
         return _predicts(item.best, empty.best, left, beyond, coarseness, odds[item.fit.keys])
 
-    improved = predicts(chosen)
+    improved, kept = predicts(chosen), ranked
     if chosen.fit.candidates and not improved:
         # What does not tell held-out readings is given up: nothing missing has its probability.
         kept = [i for i in ranked if i.fit.candidates and predicts(i)]
@@ -263,7 +263,10 @@ def judge(
         more_left = max(nothing_left, beyond(empty.fit)) > 1.0
         contradicted = coarseness == 1.0 and bool(chosen.fit.candidates) and p_value < tuned.RULED_OUT
         if not (much_left or (contradicted and more_left)) or (nothing_left <= tuned.MOST_LEFT and in_prior):
-            return Judgement("consistent", p_value, empty, (), 0.0, "")
+            _, others = as_one([empty, *(i for i in kept if i.fit.candidates)], overlapping or {})
+            # What is less likely than nothing missing, but not ruled out.
+            listed = tuple(i for i in others if tuned.LISTED <= i.probability < empty.probability)
+            return Judgement("consistent", p_value, empty, listed, 0.0, "")
         # The residual is there, and no set of the catalogue makes it likelier.
         left_over, reason = p_value, CONTRADICTED_REASON
         if much_left:

@@ -181,6 +181,17 @@ def test_a_set_that_does_not_predict_what_was_held_out_is_stated_no_higher_than_
     assert verdict(*sets, **evenly).chosen.probability == verdict(*sets, **fitted).chosen.probability
 
 
+def test_what_is_less_likely_than_nothing_missing_is_listed_beside_it():
+    nothing, weak = hypothesis(misfit=1000.0, evidence=-500.0), hypothesis(PRELOAD, misfit=998.0)
+    ranked = {item.fit.keys: item.probability for item in rank([nothing, weak])}
+    told = verdict(nothing, weak)
+    assert told.verdict == "consistent"
+    assert [(item.fit.keys, item.probability) for item in told.alternatives] == [
+        (weak.keys, pytest.approx(ranked[weak.keys]))
+    ]
+    assert tuned.LISTED < ranked[weak.keys] < told.chosen.probability
+
+
 def test_a_set_that_leaves_as_much_as_nothing_missing_is_not_named():
     sets = (
         replace(hypothesis(misfit=1000.0), heldout=700.0),
