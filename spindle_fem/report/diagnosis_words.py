@@ -54,6 +54,11 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         sets += [(item["findings"], item["probability"]) for item in content["alternatives"]]
         options = [f"{set_words(items)} ({chance(value)})" for items, value in sets]
         reason = str(content.get("reason") or "several sets explain the data").rstrip(".")
+        if len(options) == 1:
+            return (
+                f"{_when(content)}the readings differ from the model by more than noise and uncertain "
+                f"parameters. The likeliest set is {options[0]}, but {reason}. {_improvement(fit)}"
+            )
         return (
             f"{_when(content)}the readings differ from the model by more than noise and uncertain "
             f"parameters, but the data cannot tell apart {_or(options)}: {reason}. {_improvement(fit)}"
@@ -204,6 +209,8 @@ def _or(items: Sequence[str]) -> str:
 
 def checks(content: Mapping[str, Any]) -> list[str]:
     """Checks for a maintenance engineer, the most probable first."""
+    if content["verdict"] == "consistent":
+        return ["Nothing: the machine does what its definition says."]
     effects = catalogue()
     found: dict[str, None] = {}
     sets = [content["findings"], *(item["findings"] for item in content["alternatives"])]
@@ -212,8 +219,6 @@ def checks(content: Mapping[str, Any]) -> list[str]:
         if text:
             place = capital(place_words(item["component"]))
             found.setdefault(f"{place}: {text[0].lower() + text[1:]}")
-    if not found and content["verdict"] == "consistent":
-        return ["Nothing: the machine does what its definition says."]
     return list(found)
 
 

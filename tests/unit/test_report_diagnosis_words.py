@@ -8,7 +8,7 @@ import pytest
 from spindle_fem.commands.console import print_diagnosis
 from spindle_fem.inference.next_measurement import lead_words
 from spindle_fem.report.diagnosis_tables import cards, channel_table, fit_table, set_tables
-from spindle_fem.report.diagnosis_words import verdict_sentence
+from spindle_fem.report.diagnosis_words import checks, verdict_sentence
 
 STATEMENT = "312 W of heat enters the housing."
 
@@ -58,6 +58,23 @@ def test_findings_of_a_verdict_without_explanation_are_no_statements(verdict, ca
     assert any("comes nearest" in item["name"] for item in cards(told).items) == unexplained
     print_diagnosis(told, Path())
     assert ("Comes nearest: 312 W" in capsys.readouterr().out) == unexplained
+
+
+def test_one_set_that_is_doubted_is_not_told_apart_from_others():
+    told = content("ambiguous") | {"reason": "something else is likelier than the best set"}
+    sentence = verdict_sentence(told)
+    assert "The likeliest set is" in sentence
+    assert "but something else is likelier than the best set." in sentence
+    rival = told["findings"][0] | {"component": "flange"}
+    several = told | {"alternatives": [{"findings": [rival], "probability": 0.3}]}
+    assert "cannot tell apart" in verdict_sentence(several)
+
+
+def test_a_consistent_machine_needs_no_check_for_what_is_merely_not_ruled_out():
+    weak = {"findings": content("missing_physics")["findings"], "probability": 0.06}
+    told = content("consistent") | {"findings": [], "alternatives": [weak]}
+    assert checks(told) == ["Nothing: the machine does what its definition says."]
+    assert checks(told | {"verdict": "ambiguous"})[0].startswith("Housing")
 
 
 def test_only_a_verdict_that_decides_says_that_the_data_have_decided():
