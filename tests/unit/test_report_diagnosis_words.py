@@ -74,7 +74,7 @@ def test_a_consistent_machine_needs_no_check_for_what_is_merely_not_ruled_out():
     weak = {"findings": content("missing_physics")["findings"], "probability": 0.06}
     told = content("consistent") | {"findings": [], "alternatives": [weak]}
     assert checks(told) == ["Nothing: the machine does what its definition says."]
-    assert checks(told | {"verdict": "ambiguous"})[0].startswith("Housing")
+    assert checks(told | {"verdict": "ambiguous"})[0].startswith("The housing")
 
 
 def test_only_a_verdict_that_decides_says_that_the_data_have_decided():
