@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import Candidate, Reported, in_intervals
+from spindle_fem.effects.framework.effect import Candidate, Reported, in_intervals, place_words
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference.calibration import LEVEL
@@ -98,9 +98,14 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
             | _named(diagnosis, candidate)
             for (start, end), size in zip(pairs, effect.sizes(candidate, values), strict=True)
         ]
-    words = ""
+    words = "".join(
+        f" It enters at {place_words(item.component)} as well."
+        for item in fit.candidates
+        if item not in fit.named
+        and (item.effect, followed_name(item)) == (candidate.effect, followed_name(candidate))
+    )
     if state is not None:
-        words = state.words
+        words += state.words
         intervals = [
             item | {"probability": share} for item, share in zip(intervals, state.probability, strict=True)
         ]
@@ -131,9 +136,9 @@ def findings_of(diagnosis: Diagnosis, ranked: Ranked, *, split: bool) -> list[di
     Shares keep the sum of all probabilities in a file at most one; the set's
     own probability is stored beside them.
     """
-    count = max(len(ranked.fit.candidates), 1)
+    count = max(len(ranked.fit.named), 1)
     share = ranked.probability / count if split else ranked.probability
-    return [finding(diagnosis, ranked.fit, candidate, share) for candidate in ranked.fit.candidates]
+    return [finding(diagnosis, ranked.fit, candidate, share) for candidate in ranked.fit.named]
 
 
 def states_of(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import Belief, Coordinate, Departure
@@ -89,6 +90,27 @@ class Fit:
     def keys(self) -> frozenset[tuple[str, str]]:
         """Effects with their places."""
         return frozenset((c.effect, c.component) for c in self.candidates)
+
+    @property
+    def named(self) -> tuple[Candidate, ...]:
+        """Members that a set names: of heat that follows one recorded quantity at several spots, the largest.
+
+        Places are known to the spots of a model. What follows one law at two of them enters between or
+        around them.
+        """
+        sizes = {c.amplitude: abs(self.values.get(c.amplitude, 0.0)) for c in self.candidates}
+        laws = [(c.effect, followed_name(c)) for c in self.candidates]
+        largest: dict[tuple[str, str], Candidate] = {}
+        for law, candidate in zip(laws, self.candidates, strict=True):
+            if sizes[candidate.amplitude] > sizes.get(getattr(largest.get(law), "amplitude", ""), -1.0):
+                largest[law] = candidate
+        followed = zip(laws, self.candidates, strict=True)
+        return tuple(c for law, c in followed if not law[1] or largest[law] is c)
+
+    @property
+    def named_keys(self) -> frozenset[tuple[str, str]]:
+        """Effects with their places, of the members that are named."""
+        return frozenset((c.effect, c.component) for c in self.named)
 
     @property
     def reduced_misfit(self) -> float:

@@ -20,7 +20,7 @@ def may_stand_for(fit: Fit, other: Fit, overlapping: Mapping[str, frozenset[str]
     Effects on in intervals fit much: they can only replace such effects.
     """
     return (
-        len(fit.candidates) == len(other.candidates)
+        len(fit.named) == len(other.named)
         and not are_alike(fit, other, overlapping)
         and free_in_time(fit) <= free_in_time(other)
     )
@@ -37,8 +37,8 @@ def leaves_unnamed(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[st
     What no law is known for is the answer where no law of the catalogue reads the same: beside one that
     does, it is the same heat or loss at the same place without its name.
     """
-    others = [c for c in fit.candidates if (c.effect, c.component) not in chosen.keys]
-    named = [c for c in chosen.candidates if (c.effect, c.component) not in fit.keys]
+    others = [c for c in fit.named if (c.effect, c.component) not in chosen.named_keys]
+    named = [c for c in chosen.named if (c.effect, c.component) not in fit.named_keys]
     if not len(others) == len(named) == 1:
         return False
     (other,), (law,) = others, named
@@ -52,13 +52,13 @@ def leaves_unnamed(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[st
 
 def are_alike(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
     """Whether two sets name the same effects at the same or overlapping places."""
-    return len(fit.candidates) == len(chosen.candidates) and holds(fit, chosen, overlapping)
+    return len(fit.named) == len(chosen.named) and holds(fit, chosen, overlapping)
 
 
 def holds(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
     """Whether a set names every effect of another at the same or an overlapping place."""
-    left = [(c.effect, c.component) for c in chosen.candidates]
-    for candidate in fit.candidates:
+    left = [(c.effect, c.component) for c in chosen.named]
+    for candidate in fit.named:
         match = next(
             (
                 key
@@ -82,13 +82,13 @@ def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
     Two that fit within the errors leave those of their laws, which a third may fit: its odds are lowered by
     what held-out readings lack of twenty to one for it.
     """
-    shares = {item.fit.keys: item.probability for item in ranked}
+    shares = {item.fit.named_keys: item.probability for item in ranked}
     for item in ranked:
         pairs = [
             other
             for other in ranked
-            if other.fit.keys < item.fit.keys
-            and len(other.fit.keys) == 2
+            if other.fit.named_keys < item.fit.named_keys
+            and len(other.fit.named_keys) == 2
             and other.fit.reduced_misfit < tuned.EXPLAINED**2
         ]
         if not pairs or item.best.heldout is None:
@@ -96,10 +96,10 @@ def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
         pair = min(pairs, key=lambda other: other.best.heldout)
         gain = 0.5 * (pair.best.heldout - item.best.heldout) / tuned.GAIN_DIVISOR
         doubt = float(np.exp(min(0.0, gain - tuned.LEAST_HELDOUT_GAIN)))
-        third, two = shares[item.fit.keys], shares[pair.fit.keys]
+        third, two = shares[item.fit.named_keys], shares[pair.fit.named_keys]
         lowered = (third + two) * third * doubt / max(third * doubt + two, np.finfo(float).tiny)
-        shares[item.fit.keys], shares[pair.fit.keys] = lowered, third + two - lowered
-    found = [replace(item, probability=shares[item.fit.keys]) for item in ranked]
+        shares[item.fit.named_keys], shares[pair.fit.named_keys] = lowered, third + two - lowered
+    found = [replace(item, probability=shares[item.fit.named_keys]) for item in ranked]
     return sorted(found, key=lambda item: -item.probability)
 
 

@@ -28,8 +28,8 @@ def share_of_last(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float
     hypotheses : sequence of Hypothesis
         The empty one among them.
     """
-    size = len(chosen.fit.candidates)
-    smaller = [h.misfit for h in hypotheses if len(h.fit.candidates) < size]
+    size = len(chosen.fit.named)
+    smaller = [h.misfit for h in hypotheses if len(h.fit.named) < size]
     null = next(h.misfit for h in hypotheses if not h.fit.candidates)
     gain = null - chosen.misfit
     if not smaller or gain <= 0.0:
@@ -39,8 +39,8 @@ def share_of_last(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float
 
 def gain_of_more(hypotheses: Sequence[Hypothesis], chosen: Hypothesis) -> float:
     """Largest gain in log likelihood (natural logarithm) by a set with more effects, at least 0."""
-    size = len(chosen.fit.candidates)
-    larger = [h.misfit for h in hypotheses if len(h.fit.candidates) > size]
+    size = len(chosen.fit.named)
+    larger = [h.misfit for h in hypotheses if len(h.fit.named) > size]
     return max(0.0, 0.5 * (chosen.misfit - min(larger))) if larger else 0.0
 
 

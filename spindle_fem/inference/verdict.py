@@ -83,7 +83,7 @@ def rank(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[Rank
     """
     groups: dict[frozenset, list[tuple[float, Hypothesis]]] = {}
     for item, score in zip(hypotheses, tempered(hypotheses, coarseness), strict=True):
-        groups.setdefault(item.keys, []).append((score, item))
+        groups.setdefault(item.fit.named_keys, []).append((score, item))
     highest = max(score for group in groups.values() for score, _ in group)
     weights = {
         key: float(sum(np.exp(score - highest) for score, _ in group)) for key, group in groups.items()
@@ -231,8 +231,8 @@ def judge(
     ranked = rank(hypotheses, coarseness)
     p_value = detection_p_value(hypotheses, trials, coarseness)
     empty = next(item for item in ranked if not item.fit.candidates)
-    fitted = {i.fit.keys: i for i in rank([replace(h, heldout=None) for h in hypotheses], coarseness)}
-    odds = {keys: _log_odds(item, fitted[empty.fit.keys]) for keys, item in fitted.items()}
+    fitted = {i.fit.named_keys: i for i in rank([replace(h, heldout=None) for h in hypotheses], coarseness)}
+    odds = {keys: _log_odds(item, fitted[empty.fit.named_keys]) for keys, item in fitted.items()}
     nothing = 0.0
     if p_value <= tuned.SIGNIFICANT:
         ranked = _without(ranked, empty)
@@ -243,7 +243,7 @@ def judge(
         nothing = min(empty.probability, tuned.STILL_POSSIBLE)
 
     def predicts(item: Ranked) -> bool:
-        return _predicts(item.best, empty.best, left, beyond, coarseness, odds[item.fit.keys])
+        return _predicts(item.best, empty.best, left, beyond, coarseness, odds[item.fit.named_keys])
 
     improved, kept = predicts(chosen), ranked
     if chosen.fit.candidates and not improved:

@@ -7,7 +7,7 @@ import pytest
 
 from spindle_fem.inference import like_sets, tuned
 from spindle_fem.inference.hypothesis import Ranked
-from spindle_fem.inference.like_sets import with_needed_thirds
+from spindle_fem.inference.like_sets import are_alike, with_needed_thirds
 from spindle_fem.inference.verdict import NEAR_REASON, rank
 from tests.support.made_hypotheses import CHURNING, OFFSET, PRELOAD, candidate, hypothesis, verdict
 
@@ -103,3 +103,25 @@ def test_heat_without_a_name_is_no_rival_for_a_law_at_its_place(monkeypatch):
     assert (said(CHURNING, "nose").verdict, said(CHURNING, "nose").reason) == ("ambiguous", NEAR_REASON)
     assert said(candidate("sensor_gain", "F2", "sensor"), "F2").verdict == "ambiguous"
     assert said(candidate("unrecorded_cooling"), "front_bearings").verdict == "ambiguous"
+
+
+def test_heat_of_one_law_at_two_spots_is_one_set_named_at_the_larger():
+    def heat(place, size):
+        form = f"{place} following thrust"
+        made = candidate("unrecorded_heat_source", place)
+        return replace(made, form=form, amplitude=f"{place}.size"), size
+
+    def fitted(*members):
+        fit = hypothesis(*(member for member, _ in members), misfit=400.0).fit
+        at = {member.amplitude: size for member, size in members}
+        moved = [at.get(c.name, u) for c, u in zip(fit.coordinates, fit.position, strict=True)]
+        return replace(fit, position=np.array(moved))
+
+    large, small = heat("housing", 2.0), heat("SP04", 0.1)
+    one, two = fitted(large), fitted(small, large)
+    assert two.named == (large[0],)
+    assert two.named_keys == one.named_keys == {("unrecorded_heat_source", "housing")}
+    assert are_alike(one, two, {})
+    other = fitted(large, (replace(small[0], form="SP04 following load"), 0.1))
+    assert len(other.named) == 2
+    assert not are_alike(one, other, {})
