@@ -4,10 +4,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.inference import search_course, tuned
 from spindle_fem.inference.diagnosis import few_of_each
-from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.findings import findings_of
+from spindle_fem.inference.hypothesis import Hypothesis, Ranked
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.neighbouring_sets import at_other_spots, exchanged, sought_again
@@ -150,3 +152,14 @@ def test_what_a_single_bearing_needed_beside_it_is_left_out_beside_its_set(case,
         search.fit_all([(tuple(case.candidates[key] for key in keys), {})])
     search_course.improve(search)
     assert search.ranked()[0].keys == {DRY_SET, LOOSE}
+
+
+def test_one_heat_at_two_spots_is_one_finding_that_names_both(case, heated):
+    search = search_over(case, heated)
+    following = {c.component: c for c in search.candidates if followed_name(c)}
+    nose, shaft = following["nose"], following["shaft"]
+    start = {nose.amplitude: 20.0, shaft.amplitude: 60.0}
+    fit = search.problem.fit((nose, shaft), start, iterations=0)
+    (told,) = findings_of(heated, Ranked(Hypothesis(fit, -1.0), 0.8), split=True)
+    assert (told["component"], told["probability"]) == ("shaft", 0.8)
+    assert told["statement"].endswith("It enters at the nose as well.")
