@@ -187,11 +187,11 @@ WORSE_HELDOUT = 1.05
 # of generate_rough with p-values below 0.003 gained less held out alone; ten consistent ones have
 # 0.04 and more.)
 LEAST_HELDOUT_GAIN = 3.0
-# Share by which a set must lower the residual over the noise, of held-out readings in a network, of all of a
-# machine with geometry. (Right sets of seed 51 of generate_networks and of the examples lower it by 3 % and
-# more, false alarms by 1 % and less; small right sets of seed 367 of generate_rough by 3 % and more, a false
-# one of seed 379 by nothing.)
-LEAST_IMPROVEMENT = 0.02
+# Share by which a set must lower the residual over the noise: of held-out readings in a network, and of all of
+# a machine with geometry. (Right sets of seed 51 of generate_networks and of the examples lower it by more,
+# false alarms by 1 % and less. Small right sets of seeds 367 and 379 of generate_rough lower it by 1.9 % and
+# more, a false one by nothing.)
+LEAST_IMPROVEMENT, LEAST_IMPROVEMENT_DRAWN = 0.03, 0.01
 # Likewise of a set with events, from which on laws that leave little are not enough. (Consistent networks of
 # seeds 66 and 101: at most 0.17 in 21; states that had been missed there: 0.39 and 0.47.)
 IMPROVEMENT_OF_EVENTS = 0.25

@@ -197,7 +197,7 @@ def test_a_set_that_leaves_as_much_as_nothing_missing_is_not_named():
         replace(hypothesis(misfit=1000.0), heldout=700.0),
         replace(hypothesis(PRELOAD, misfit=950.0), heldout=680.0),
     )
-    for less, named in ((0.985, "consistent"), (0.975, "missing_physics")):
+    for less, named in ((0.992, "consistent"), (0.988, "missing_physics")):
         told = verdict(*sets, left=lambda fit, less=less: less if fit.candidates else 1.0)
         assert told.verdict == named
 
