@@ -156,8 +156,10 @@ class GapClosure(Effect):
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """State how far the seats are open and at which difference they close."""
         over = "the housing" if OVER_HOUSING in candidate.form else "their temperature at the start"
+        closed = reported["closed"].value
+        cold = closed * (1.0 - reported["opening"].value)
         return (
-            f"{capital(place_words(candidate.component))}: cold, the outer seats conduct down to "
-            f"{1.0 - reported['opening'].value:.2f} of nominal; they close where the outer rings are "
+            f"{capital(place_words(candidate.component))}: cold, the outer seats conduct {cold:.2f} of nominal, "
+            f"closed {closed:.2f}; they close where the outer rings are "
             f"{quantity(reported['closing_difference'])} above {over}."
         )
