@@ -159,7 +159,7 @@ class GapClosure(Effect):
         closed = reported["closed"].value
         cold = closed * (1.0 - reported["opening"].value)
         return (
-            f"{capital(place_words(candidate.component))}: cold, the outer seats conduct {cold:.2f} of nominal, "
-            f"closed {closed:.2f}; they close where the outer rings are "
+            f"{capital(place_words(candidate.component))}: cold, the outer seats conduct {cold:.2f} of "
+            f"nominal, closed {closed:.2f}; they close where the outer rings are "
             f"{quantity(reported['closing_difference'])} above {over}."
         )
