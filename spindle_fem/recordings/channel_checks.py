@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.stats import chi2
@@ -26,7 +27,7 @@ class Flag(IntFlag):
 
 
 # Lengths are in samples, temperatures in K.
-SPIKE_WINDOW = 5
+SPIKE_WINDOW, SWING_WINDOW = 5, 6
 SPIKE_PASSES = 4
 SPIKE_SIGMAS = 6.0
 SPIKE_FLOOR = 0.5
@@ -201,7 +202,7 @@ def temperature_flags(
     noise = max(white, min(grid, 1.0), 0.0 if sigma is None else sigma)
     kept = rows
     for _ in range(SPIKE_PASSES):  # a spike beside another shows once the first is out
-        spikes = _spikes(kelvin[kept], noise, white)
+        spikes = _spikes(kelvin[kept], noise, white) | _swings(kelvin[kept], noise, white)
         flags[kept[spikes]] |= np.uint8(Flag.SPIKE)
         if not spikes.any():
             break
@@ -228,6 +229,22 @@ def _spikes(values: Array, noise: float, white: float) -> NDArray[np.bool_]:
     # the first and the last reading have neighbours on one side only: they may be the start of a change
     least[[0, -1]] *= SPIKE_EDGE_FACTOR
     return departures > np.maximum(least, SPIKE_STANDS_OUT * roughness)
+
+
+def _swings(values: Array, noise: float, white: float) -> NDArray[np.bool_]:
+    """Pairs of readings that depart to either side of those before and after them, as no temperature does."""
+    found = np.zeros(values.size, dtype=bool)
+    if values.size < SWING_WINDOW:
+        return found
+    earlier, before, first, second, after, later = sliding_window_view(values, SWING_WINDOW).T
+    departures = first - (2.0 * before + after) / 3.0, second - (before + 2.0 * after) / 3.0
+    roughness = np.abs([before - earlier, after - before, later - after]).max(axis=0)
+    roughness = np.maximum(0.0, roughness - SPIKE_ROUGHNESS_SIGMAS * white)
+    least = np.maximum(max(SPIKE_SIGMAS * noise, SPIKE_FLOOR), SPIKE_STANDS_OUT * roughness)
+    swings = (np.prod(departures, axis=0) < 0.0) & (np.abs(departures).min(axis=0) > least)
+    rows = np.flatnonzero(swings)[:, None] + (2, 3)
+    found[rows] = True
+    return found
 
 
 def _dropouts(values: Array, noise: float) -> NDArray[np.bool_]:

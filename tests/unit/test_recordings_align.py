@@ -128,6 +128,20 @@ def test_spikes_are_flagged_and_kept(tmp_path):
     assert not recording.usable[at].any()
 
 
+@pytest.mark.parametrize(("first", "second"), [(-27.9, 19.4), (6.0, -9.0)])
+def test_two_spikes_to_either_side_are_both_flagged(first, second):
+    _, values = signal()
+    values[[40, 41]] += [first, second]
+    flags = temperature_flags(values + 273.15, 0.05, 0.1, judge_stuck=True)
+    assert np.flatnonzero(flags).tolist() == [40, 41]
+
+
+@pytest.mark.parametrize("samples", [2, 3, 4, 7])
+def test_what_swings_all_the_time_is_no_pair_of_spikes(samples):
+    swing = 300.0 + 3.0 * np.sin(2.0 * np.pi * np.arange(200) / samples + 0.4)
+    assert not temperature_flags(swing, 0.05, 0.0, judge_stuck=True).any()
+
+
 def test_spike_of_an_input_temperature_is_bridged(tmp_path):
     times, values = signal()
     ambient = np.full(400, 20.0)
