@@ -98,12 +98,9 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
             | _named(diagnosis, candidate)
             for (start, end), size in zip(pairs, effect.sizes(candidate, values), strict=True)
         ]
-    words = "".join(
-        f" It enters at {place_words(item.component)} as well."
-        for item in fit.candidates
-        if item not in fit.named
-        and (item.effect, followed_name(item)) == (candidate.effect, followed_name(candidate))
-    )
+    law = candidate.effect, followed_name(candidate)
+    elsewhere = [c for c in fit.candidates if c is not candidate and (c.effect, followed_name(c)) == law]
+    words = "".join(f" It enters at {place_words(c.component)} as well." for c in elsewhere if law[1])
     if state is not None:
         words += state.words
         intervals = [

@@ -98,14 +98,14 @@ class Fit:
         Places are known to the spots of a model. What follows one law at two of them enters between or
         around them.
         """
-        sizes = {c.amplitude: abs(self.values.get(c.amplitude, 0.0)) for c in self.candidates}
-        laws = [(c.effect, followed_name(c)) for c in self.candidates]
-        largest: dict[tuple[str, str], Candidate] = {}
-        for law, candidate in zip(laws, self.candidates, strict=True):
-            if sizes[candidate.amplitude] > sizes.get(getattr(largest.get(law), "amplitude", ""), -1.0):
-                largest[law] = candidate
-        followed = zip(laws, self.candidates, strict=True)
-        return tuple(c for law, c in followed if not law[1] or largest[law] is c)
+        values = self.values
+
+        def largest_like(candidate: Candidate) -> Candidate:
+            law = candidate.effect, followed_name(candidate)
+            alike = [c for c in self.candidates if (c.effect, followed_name(c)) == law]
+            return max(alike, key=lambda c: abs(values.get(c.amplitude, 0.0)))
+
+        return tuple(c for c in self.candidates if not followed_name(c) or largest_like(c) is c)
 
     @property
     def named_keys(self) -> frozenset[tuple[str, str]]:
