@@ -39,7 +39,7 @@ from spindle_fem.inference.prepared_problem import (
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.state_search import InferredState, inferred_states, states_on_rows
-from spindle_fem.inference.verdict import Judgement, judge, lowers_residual, rank, tempered
+from spindle_fem.inference.verdict import Judgement, judge, rank, tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
 from spindle_fem.parallel import thread_count
@@ -240,8 +240,6 @@ def diagnose_recordings(
     if wrong is not None and null.heldout is not None:
         within = Problem(unchanged, calibrated.known, slow, predictor.observations).fit((), null.fit.values)
         told = 0.5 * (readings.heldout_misfit(within) - null.heldout) / (coarseness * tuned.GAIN_DIVISOR)
-        if coarseness == 1.0 and not lowers_residual(null.fit, within, readings.left, readings.beyond):
-            told = -np.inf
     judgement = with_wrong_definition(judgement, null.fit, wrong, told)
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit

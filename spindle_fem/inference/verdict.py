@@ -364,22 +364,9 @@ def _predicts(
     gain = _heldout_gain(chosen, empty)
     if coarseness > 1.0:
         return gain >= tuned.LEAST_HELDOUT_GAIN
-    lower = lowers_residual(chosen.fit, empty.fit, left, beyond)
+    rest, before = (np.sqrt(3.0 * left(fit) ** 2 + beyond(fit) ** 2) for fit in (chosen.fit, empty.fit))
+    lower = rest <= (1.0 - tuned.LEAST_IMPROVEMENT_DRAWN) * before
     return lower and max(gain, gain + odds) >= tuned.LEAST_HELDOUT_GAIN
-
-
-def lowers_residual(
-    fit: Fit, other: Fit, left: Callable[[Fit], float], beyond: Callable[[Fit], float]
-) -> bool:
-    """Whether a fit of a machine with geometry leaves less of all readings than another.
-
-    Parameters
-    ----------
-    left, beyond : callable
-        As :func:`judge` takes them; a quarter of the readings is held out.
-    """
-    rest, before = (np.sqrt(3.0 * left(item) ** 2 + beyond(item) ** 2) for item in (fit, other))
-    return bool(rest <= (1.0 - tuned.LEAST_IMPROVEMENT_DRAWN) * before)
 
 
 def _heldout_gain(chosen: Hypothesis, empty: Hypothesis) -> float:
