@@ -5,6 +5,7 @@ import pytest
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
+from tests.support.diagnosed_spindle import HEAT, Case
 from tests.support.lumped_spindle import drive_of, lumped_model
 
 
@@ -36,3 +37,20 @@ def steps():
 def short_drive():
     """Through the same speeds in a third of the time, where a run is marched dozens of times."""
     return driven_for(2400.0)
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    """A lumped spindle that is made to differ in known ways."""
+    return Case(tmp_path_factory.mktemp("lumped"))
+
+
+@pytest.fixture(scope="module")
+def heated(case):
+    """Front bearings get heat for a while that nobody wrote down; thermal preload may be it too."""
+    return case.diagnosis(
+        ("unrecorded_heat_source", "front_bearings"),
+        HEAT,
+        "ambiguous",
+        (("thermal_preload", "front_bearings"),),
+    )

@@ -45,24 +45,7 @@ from tests.support.diagnosed_spindle import (
     PROBES,
     TIMES,
     UNTIL,
-    Case,
 )
-
-
-@pytest.fixture(scope="module")
-def case(tmp_path_factory):
-    return Case(tmp_path_factory.mktemp("lumped"))
-
-
-@pytest.fixture(scope="module")
-def heated(case):
-    """Front bearings get heat for a while that nobody wrote down; thermal preload may be it too."""
-    return case.diagnosis(
-        ("unrecorded_heat_source", "front_bearings"),
-        HEAT,
-        "ambiguous",
-        (("thermal_preload", "front_bearings"),),
-    )
 
 
 @pytest.fixture(scope="module")
