@@ -359,9 +359,11 @@ def _refit(
     # Whether anything is missing is a separate question (the p-value): here sets are compared.
     ranked = [h for h in everything if h.keys] or everything
     best = score[id(ranked[0])]
+    # Links of a network differ by more than spots of a machine do.
+    different = few_of_each(ranked) if coarseness == 1.0 else ranked
     chosen = [
         item
-        for position, item in enumerate(few_of_each(ranked)[: tuned.REFITTED])
+        for position, item in enumerate(different[: tuned.REFITTED])
         if position < tuned.ALWAYS_REFITTED or score[id(item)] > best - tuned.NEGLIGIBLE_SCORE
     ]
     # The slow error has changed since the search: test again whether the best set needs each member.
