@@ -213,9 +213,12 @@ def _combination(search: Search, hypothesis: Hypothesis, signed: bool = False) -
     One effect at several places, and what is on in intervals as heat or as
     loss unless ``signed``, are much the same start for a search.
     """
-    together = [not signed and search.in_intervals(c) for c in hypothesis.fit.candidates]
-    names = zip(together, hypothesis.fit.candidates, strict=True)
-    return tuple(sorted("intervals" if one else c.effect for one, c in names))
+    return tuple(
+        sorted(
+            "intervals" if not signed and search.in_intervals(c) else c.effect
+            for c in hypothesis.fit.candidates
+        )
+    )
 
 
 def _only_laws(search: Search, hypothesis: Hypothesis) -> bool:

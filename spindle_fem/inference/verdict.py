@@ -364,6 +364,7 @@ def _predicts(
     gain = _heldout_gain(chosen, empty)
     if coarseness > 1.0:
         return gain >= tuned.LEAST_HELDOUT_GAIN
+    # A quarter of the readings is held out by default.
     rest, before = (np.sqrt(3.0 * left(fit) ** 2 + beyond(fit) ** 2) for fit in (chosen.fit, empty.fit))
     lower = rest <= (1.0 - tuned.LEAST_IMPROVEMENT_DRAWN) * before
     return lower and max(gain, gain + odds) >= tuned.LEAST_HELDOUT_GAIN
