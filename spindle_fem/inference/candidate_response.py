@@ -255,10 +255,13 @@ class BaseRun:
 
         A change of the machine or of what a probe feels is passed through those effects afterwards.
         """
-        if all(c.reading is None for c in self.candidates):
+        lies = [c.reading is not None and not c.reading.before_sensor for c in self.candidates]
+        if not any(lies):
             return self.predicted()
         if self._felt is None:
-            machine = [replace(c, reading=None) for c in self.candidates]
+            machine = [
+                replace(c, reading=None) if lie else c for c, lie in zip(self.candidates, lies, strict=True)
+            ]
             shared = {name for c in machine for name in c.parameters}
             lying = {name for c in self.candidates for name in c.parameters} - shared
             values = {name: value for name, value in self.values.items() if name not in lying}

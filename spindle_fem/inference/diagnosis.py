@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
@@ -17,17 +16,16 @@ from spindle_fem.effects.registry import candidates_for, catalogue, interval_eff
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.candidate_response import variants_of
+from spindle_fem.inference.final_fits import fitted_sets, likelier_about, to_be_fitted
 from spindle_fem.inference.followed_readings import Followed, FollowedReadings
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.hypothesis_search import Search
-from spindle_fem.inference.like_sets import may_stand_for
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.missing_heat import Explanation, Pattern, explain, onset_answers
 from spindle_fem.inference.opened_machine import DiagnosedMachine
-from spindle_fem.inference.other_answers import with_other_answers
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import (
     Calibrated,
@@ -38,9 +36,10 @@ from spindle_fem.inference.prepared_problem import (
 )
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
+from spindle_fem.inference.set_problems import SetProblems, members_of
 from spindle_fem.inference.state_search import InferredState, inferred_states, states_on_rows
-from spindle_fem.inference.verdict import Judgement, judge, rank, tempered
-from spindle_fem.inference.worker_processes import FitOrder, Workers
+from spindle_fem.inference.verdict import Judgement, judge, rank
+from spindle_fem.inference.worker_processes import Workers
 from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
 from spindle_fem.parallel import thread_count
 
@@ -206,23 +205,28 @@ def diagnose_recordings(
             predictor = with_misdescriptions(predictor, directions, best.fit.values, best.fit.candidates)
         except NOT_SIMULATED as error:
             notes = (f"What drawings leave open is taken about nothing missing, not about the set: {error}",)
-    final = Problem(predictor, belief, slow, predictor.observations)
+    about_first = Problem(predictor, belief, slow, predictor.observations)
     overlapping = overlapping_components(view)
-    refitted = _refit(final, found, workers, overlapping, FollowedReadings(final, final), coarseness)
+    sets = to_be_fitted(about_first, found, overlapping, coarseness)
+    problems = SetProblems(about_first, about_first, {members_of(best.fit): about_first})
+    problems = problems.about([h.fit for h in sets], workers)
+    refitted = fitted_sets(problems, sets, workers)
     own = own_fit()
     after = next(h.fit for h in refitted if not h.fit.candidates)
     if after.misfit_with_prior < own.misfit_with_prior:
-        unchanged, plain, own = predictor, final, after
-    elif _likelier_about(plain, refitted[0].fit):
+        own = after
+    elif likelier_about(plain, refitted[0].fit):
         # Columns that mislead nothing missing mislead a set too: those about nothing missing then serve all.
-        predictor, final = unchanged, plain
-        refitted = _refit(final, found, workers, overlapping, FollowedReadings(final, final), coarseness)
-    fitted_without(unchanged, own)
+        problems = SetProblems(plain, plain)
+        refitted = fitted_sets(problems, to_be_fitted(plain, found, overlapping, coarseness), workers)
+    else:
+        problems = replace(problems, plain=plain)
+    fitted_without(problems.plain.predictor, own)
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
-    readings = FollowedReadings(final, plain, lambda fit: inferred_states(search, final, fit))
+    readings = FollowedReadings(problems, lambda fit: inferred_states(search, problems.of(fit), fit))
     # Where likelihoods hold, they weigh held-out readings too; on a coarse machine only their errors tell.
     kept = readings.kept(refitted) if machine.is_network else refitted
-    refitted = with_own_noise(plain, readings.residuals, kept)
+    refitted = with_own_noise(problems.plain, readings.residuals, kept)
     refitted = [replace(h, heldout=readings.heldout_misfit(h.fit)) for h in refitted]
     clock.lap("final fits")
     tried = len(variants_of(candidates)) + len(view.spots) * len(interval_effects())
@@ -238,15 +242,18 @@ def diagnose_recordings(
     )
     null, told = next(h for h in refitted if not h.fit.candidates), 0.0
     if wrong is not None and null.heldout is not None:
-        within = Problem(unchanged, calibrated.known, slow, predictor.observations).fit((), null.fit.values)
+        within = Problem(problems.plain.predictor, calibrated.known, slow, predictor.observations).fit(
+            (), null.fit.values
+        )
         told = 0.5 * (readings.heldout_misfit(within) - null.heldout) / (coarseness * tuned.GAIN_DIVISOR)
     judgement = with_wrong_definition(judgement, null.fit, wrong, told)
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit
+    about_chosen = problems.of(chosen_fit) if chosen_fit.candidates else problems.first
     followed = readings.followed(chosen_fit)
     if followed.states and machine.rows:
         finer = readings.with_states(
-            chosen_fit, states_on_rows(search, final, followed.fit, machine.rows, directions)
+            chosen_fit, states_on_rows(search, about_chosen, followed.fit, machine.rows, directions)
         )
         # On rows what a coarse picture leaves may pass for a state that flickers.
         followed = min(followed, finer, key=readings.left_with)
@@ -259,8 +266,8 @@ def diagnose_recordings(
         ]
     clock.lap("location")
     return Diagnosis(
-        predictor,
-        unchanged,
+        about_chosen.predictor,
+        problems.plain.predictor,
         view,
         calibrated,
         tuple(refitted),
@@ -291,29 +298,6 @@ def _calibrated(
     return calibrate(earlier, predictor.misdescribed_by(directions, {}))
 
 
-def _begun_with_more(problem: Problem, item: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis:
-    """A set fitted again from where one that holds more ended, if it begins better there.
-
-    Where a further member does nothing, the fit of the rest has ended elsewhere.
-    """
-    for more in fitted:
-        if item.keys < more.keys and problem.begins_better(item.fit, more.fit.values):
-            item = replace(item, fit=problem.fit(item.fit.candidates, more.fit.values))
-    return item
-
-
-def _likelier_about(problem: Problem, fit: Fit) -> bool:
-    """Whether a set is likelier by what directions do in another problem than in that of its own fit.
-
-    By more than what a fit that begins at the end of another gains anyway: all sets are fitted again then.
-    """
-    try:
-        again = problem.fit(fit.candidates, fit.values)
-    except NOT_SIMULATED:
-        return False
-    return again.misfit_with_prior < fit.misfit_with_prior - 2.0 * tuned.WORTH_ANOTHER
-
-
 def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:
     """Components that a decision does not distinguish from each component.
 
@@ -331,79 +315,6 @@ def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:
         for name in found[probe] - {probe}:
             found.setdefault(name, {name}).add(probe)
     return {name: frozenset(family) for name, family in found.items()}
-
-
-def few_of_each(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Sets without more than a few places and forms of one combination of effects, which hide the others."""
-    seen: Counter[tuple[str, ...]] = Counter()
-    found = []
-    for item in ranked:
-        names = tuple(sorted(c.effect for c in item.fit.candidates))
-        seen[names] += 1
-        if seen[names] <= tuned.REFITTED_OF_EACH:
-            found.append(item)
-    return found
-
-
-def _refit(
-    problem: Problem,
-    found: Sequence[Hypothesis],
-    workers: Workers,
-    overlapping: Mapping[str, frozenset[str]],
-    readings: FollowedReadings,
-    coarseness: float,
-) -> list[Hypothesis]:
-    """The most probable hypotheses, what reads nearly as the first, and the empty one, on the whole basis."""
-    score = {id(h): value for h, value in zip(found, tempered(found, coarseness), strict=True)}
-    everything = sorted(found, key=lambda h: -score[id(h)])
-    # Whether anything is missing is a separate question (the p-value): here sets are compared.
-    ranked = [h for h in everything if h.keys] or everything
-    best = score[id(ranked[0])]
-    # Links of a network differ by more than spots of a machine do.
-    different = few_of_each(ranked) if coarseness == 1.0 else ranked
-    chosen = [
-        item
-        for position, item in enumerate(different[: tuned.REFITTED])
-        if position < tuned.ALWAYS_REFITTED or score[id(item)] > best - tuned.NEGLIGIBLE_SCORE
-    ]
-    # The slow error has changed since the search: test again whether the best set needs each member.
-    members = ranked[0].keys
-    smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
-    chosen += [h for h in smaller if h not in chosen]
-    for size in range(len(members)):
-        chosen += [h for h in everything if len(h.fit.candidates) == size and h not in chosen][:1]
-    first = ranked[0].fit
-    rivals = [
-        h
-        for h in ranked
-        if h not in chosen
-        and may_stand_for(h.fit, first, overlapping)
-        and h.fit.misfit_with_prior < first.misfit_with_prior + tuned.NEAREST_WITHIN * tuned.NEAR_MISFIT
-    ]
-    nearest = sorted((readings.apart(first, h.fit), i, h) for i, h in enumerate(rivals))
-    chosen += [
-        h
-        for distance, _, h in nearest[: tuned.NEAREST_REFITTED]
-        if distance < tuned.NEAREST_WITHIN * tuned.NEAR_READINGS
-    ]
-    # Sets far behind the first need not be fitted to their optimum, but for its parts: they are what is
-    # named where the rest of it is not needed.
-    begun = problem.cost_at(first.candidates, first.values)
-    behind = begun + 2.0 * tuned.HOPELESS_SCORE
-    orders = [
-        FitOrder(
-            h.fit.candidates, h.fit.values, iterations=12, hopeless=np.inf if h.keys < members else behind
-        )
-        for h in chosen
-    ]
-    # A set that could be simulated on the search's basis may run away on the whole one, and is dropped then.
-    fitted = [
-        replace(item, fit=fit)
-        for fit, item in zip(workers.fits(problem, orders), chosen, strict=True)
-        if fit is not None
-    ]
-    fitted = with_other_answers(problem, [_begun_with_more(problem, h, fitted) for h in fitted], workers)
-    return sorted(fitted, key=lambda h: -h.score)
 
 
 class _Clock:

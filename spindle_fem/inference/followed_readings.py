@@ -15,6 +15,7 @@ from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.input_sampling import error_over_noise, left_over_noise
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.reading_noise import ChannelBins
+from spindle_fem.inference.set_problems import SetProblems
 from spindle_fem.inference.state_search import InferredState
 from spindle_fem.inference.unseen_moments import unread_changes, unseen_moments
 
@@ -43,25 +44,19 @@ class FollowedReadings:
 
     Parameters
     ----------
-    final, plain : Problem
-        With effects, and with nothing missing.
+    problems : SetProblems
+        With effects, each set its own, and with nothing missing.
     follow : callable
         Hidden states of a fit from all readings, as :func:`inferred_states` gives them.
     """
 
     def __init__(
         self,
-        final: Problem,
-        plain: Problem,
+        problems: SetProblems,
         follow: Callable[[Fit], Mapping[str, InferredState]] = lambda fit: {},
     ) -> None:
-        self._plant, self._unchanged, self._final = final.predictor, plain.predictor, final
-        self._slow = final.slow
-        self._held = [
-            Problem(predictor, final.belief, final.slow, self._plant.heldout)
-            for predictor in (plain.predictor, final.predictor)
-            if self._plant.heldout
-        ]
+        self._problems, self._plant = problems, problems.first.predictor
+        self._slow, self._belief = problems.first.slow, problems.first.belief
         self._follow = follow
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
         self._followed: dict[int, tuple[Fit, Followed]] = {}
@@ -114,9 +109,10 @@ class FollowedReadings:
 
         With that of the calibration's readings: a fit that gives them up to tell others predicts less.
         """
-        if not self._held:
+        predictor = self._problems.of(fit).predictor
+        if not predictor.heldout:
             return None
-        held = self._held[bool(fit.candidates)]
+        held = Problem(predictor, self._belief, self._slow, predictor.heldout)
         return self._given_up(fit).misfit + held.averaged_misfit(self.followed(fit).fit)
 
     def _predicted_by_all(self, fit: Fit, seen: Sequence[Observation]) -> list[Array]:
@@ -144,9 +140,9 @@ class FollowedReadings:
                 c if state is None else state.fitted or state.candidate
                 for c, state in zip(fit.candidates, own, strict=True)
             )
-            again = self._final.fit(chosen, fit.values, iterations=FOLLOWED_STEPS)
-        moments = unseen_moments(self._plant, again)
-        moments |= unread_changes(self._plant if fit.candidates else self._unchanged, again)
+            again = self._problems.of(fit).fit(chosen, fit.values, iterations=FOLLOWED_STEPS)
+        predictor = self._problems.of(fit).predictor
+        moments = unseen_moments(predictor, again) | unread_changes(predictor, again)
         if moments:
             moved = [
                 c.of(moments[c.name]) if c.name in moments else u
@@ -177,7 +173,7 @@ class FollowedReadings:
 
     def _given_up(self, fit: Fit) -> GivenUp:
         """What a fit gives up of the calibration's readings."""
-        known = self._final.belief
+        known = self._belief
         if known.earlier is None:
             return GivenUp()
         if id(fit) not in self._given:
@@ -191,9 +187,9 @@ class FollowedReadings:
 
     def _predicted(self, fit: Fit) -> list[Array]:
         if id(fit) not in self._known:
-            plant = self._plant if fit.candidates else self._unchanged
+            predictor = self._problems.of(fit).predictor
             predicted = [
-                plant.predict(number, fit.values, fit.candidates).temperature
+                predictor.predict(number, fit.values, fit.candidates).temperature
                 for number in range(len(self._plant.recordings))
             ]
             # The fit is kept so that no other takes its identity.

@@ -202,6 +202,7 @@ def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
             "time by which temperatures are stamped later than inputs",
             clock_change,
             number,
+            of_sensor=True,
         )
 
 

@@ -59,7 +59,8 @@ class Misdescription:
     recording : int or None
         The only recording that it concerns; None for the machine itself.
     of_sensor : bool
-        Whether it is a sensor that differs: far off it is an effect of the catalogue, no wrong definition.
+        Whether it is what is read that differs, not the machine: far off it is an effect of the catalogue,
+        no wrong definition.
     """
 
     name: str

@@ -57,13 +57,24 @@ def with_misdescriptions(
     values, candidates
         As :meth:`Predictor.predict` takes them.
     """
+    columns = columns_about(predictor, directions, values, candidates)
+    return predictor.misdescribed_by(directions, columns, (dict(values), tuple(candidates)))
+
+
+def columns_about(
+    predictor: Predictor,
+    directions: Sequence[Misdescription],
+    values: Mapping[str, float],
+    candidates: Sequence[Candidate],
+) -> dict[tuple[int, str], Array]:
+    """What directions do about runs with the given values, as :meth:`Predictor.misdescribed_by` takes it."""
     columns = {}
     for number in range(len(predictor.recordings)):
         acting = [item for item in directions if item.recording in (None, number)]
         if acting:
             found, _ = direction_columns(BaseRun(predictor, number, values, candidates), acting)
             columns |= {(number, item.coordinate): found[:, :, i] for i, item in enumerate(acting)}
-    return predictor.misdescribed_by(directions, columns, (dict(values), tuple(candidates)))
+    return columns
 
 
 def direction_columns(base: BaseRun, directions: Sequence[Misdescription]) -> tuple[Array, Array]:

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Hypothesis
-from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.set_problems import SetProblems
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 
 Array = NDArray[np.float64]
@@ -37,7 +38,9 @@ def other_starts(fit: Fit) -> list[Mapping[str, float]]:
     return found
 
 
-def with_other_answers(problem: Problem, fitted: Sequence[Hypothesis], workers: Workers) -> list[Hypothesis]:
+def with_other_answers(
+    problems: SetProblems, fitted: Sequence[Hypothesis], workers: Workers
+) -> list[Hypothesis]:
     """Fitted sets at the most probable answer of each, with their other ones; sets far behind unchanged.
 
     A set that holds a likelier one begins again only where that one has moved to another answer.
@@ -49,14 +52,14 @@ def with_other_answers(problem: Problem, fitted: Sequence[Hypothesis], workers: 
         for h, own in zip(fitted, starts, strict=True)
     ]
     first = [[] if held else own for own, held in zip(starts, parts, strict=True)]
-    found = _from_starts(problem, fitted, first, workers)
+    found = _from_starts(problems, fitted, first, workers)
     moved = [any(f is h.fit for f in new.fit.others) for new, h in zip(found, fitted, strict=True)]
     again = [[found[i].fit.values for i in held if moved[i]][:1] for held in parts]
-    return _from_starts(problem, found, again, workers)
+    return _from_starts(problems, found, again, workers)
 
 
 def _from_starts(
-    problem: Problem,
+    problems: SetProblems,
     fitted: Sequence[Hypothesis],
     starts: Sequence[Sequence[Mapping[str, float]]],
     workers: Workers,
@@ -76,7 +79,8 @@ def _from_starts(
         for start in own
     ]
     answers = [[h.fit] for h in fitted]
-    for (index, _), fit in zip(tasks, workers.fits(problem, [order for _, order in tasks]), strict=True):
+    own = [problems.of(fitted[index].fit) for index, _ in tasks]
+    for (index, _), fit in zip(tasks, workers.fits(own, [order for _, order in tasks]), strict=True):
         if fit is not None:
             answers[index].append(fit)
     return [

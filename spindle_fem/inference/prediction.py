@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -51,6 +51,18 @@ class Prediction:
         own = np.zeros(self.tangents.shape[2])
         np.add.at(own, self.columns[inside], move[inside])
         return replace(self, states=self.states + self.tangents @ own, tangents=None)
+
+    def add(
+        self, names: Sequence[str], slopes: Array, values: Mapping[str, float], derivatives: Sequence[str]
+    ) -> None:
+        """Add what coordinates with constant slopes (G + 1, c, n) do, and derivatives by them, in place."""
+        if names:
+            by = np.array([values.get(name, 0.0) for name in names])
+            # Of one matrix: there may be hundreds of directions.
+            change = slopes.reshape(-1, len(names)) @ by
+            self.temperature[:] += change.reshape(self.temperature.shape)
+            asked = [index for index, name in enumerate(names) if name in derivatives]
+            self.sensitivity[:, :, [derivatives.index(names[i]) for i in asked]] += slopes[:, :, asked]
 
     def slopes_at(self, places: Array) -> Array:
         """Derivatives (G + 1, n, p) of the temperatures of places (n, r) by the requested coordinates."""

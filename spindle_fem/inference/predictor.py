@@ -47,6 +47,8 @@ from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
+# Values of coordinates by name, and those to differentiate by.
+Told = tuple[Mapping[str, float], Sequence[str]]
 
 # Longest step of a diagnosed machine with geometry, s; readings are averaged over as long.
 STEP = 60.0
@@ -376,10 +378,14 @@ class Predictor:
         predicted = Prediction(temperature, sensitivity, found.states, run, found.tangents, owners)
         self._displace(number, predicted, values, derivatives)
         self._unseen(number, predicted, values, derivatives)
-        for reading in self.effects.readings:
-            self._read(number, reading, predicted, {}, ())
-        for reading in _readings(acting):
-            self._read(number, reading, predicted, values, derivatives)
+        own = [(reading, {}, ()) for reading in self.effects.readings]
+        own += [(reading, values, derivatives) for reading in _readings(acting)]
+        # What a sensor does wrong it does to what reaches it.
+        for of_sensor in (False, True):
+            self._misdescribe(number, predicted, (values, derivatives), of_sensor=of_sensor)
+            for reading, *told in own:
+                if reading.before_sensor is not of_sensor:
+                    self._read(number, reading, predicted, *told)
         return predicted
 
     def _displace(
@@ -401,31 +407,23 @@ class Predictor:
     def _unseen(
         self, number: int, predicted: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
     ) -> None:
-        """Add first-order changes by events in gaps and deviations of the machine, in place."""
-        known, slopes = self.directions_of(number)
-        if known:
-            by = np.array([values.get(name, 0.0) for name in known])
-            # Of one matrix: there may be hundreds of directions.
-            change = slopes.reshape(-1, len(known)) @ by
-            predicted.temperature[:] += change.reshape(predicted.temperature.shape)
-            asked = [k for k, name in enumerate(known) if name in derivatives]
-            places = [derivatives.index(known[k]) for k in asked]
-            predicted.sensitivity[:, :, places] += slopes[:, :, asked]
+        """Add first-order changes by what gaps and rows leave open, in place."""
         for kind, open_ones in ((JUMP_PREFIX, self._jumps[number]), (GAP_PREFIX, self._hidden[number])):
             names = [f"{kind}{number}.{index}" for index in range(len(open_ones))]
-            if not any(name in values or name in derivatives for name in names):
-                continue
-            columns, at = self._columns_of(kind, number), np.array([values.get(n, 0.0) for n in names])
-            if kind == JUMP_PREFIX:
-                at, by = weights_of_earlier(np.array([most for *_, most in open_ones]), at)
-            change = columns.reshape(-1, at.size) @ at.ravel()
-            predicted.temperature[:] += change.reshape(predicted.temperature.shape)
-            asked = [index for index, name in enumerate(names) if name in derivatives]
-            if asked:
-                own = columns[:, :, asked]
+            if any(name in values or name in derivatives for name in names):
+                slopes, at = self._columns_of(kind, number), values
                 if kind == JUMP_PREFIX:
-                    own = np.einsum("gcnt,nt->gcn", own, by[asked])
-                predicted.sensitivity[:, :, [derivatives.index(names[i]) for i in asked]] += own
+                    earlier = np.array([values.get(name, 0.0) for name in names])
+                    earlier, by = weights_of_earlier(np.array([most for *_, most in open_ones]), earlier)
+                    predicted.temperature[:] += np.tensordot(slopes, earlier, 2)
+                    slopes, at = np.einsum("gcnt,nt->gcn", slopes, by), NO_VALUES
+                predicted.add(names, slopes, at, derivatives)
+
+    def _misdescribe(self, number: int, predicted: Prediction, told: Told, *, of_sensor: bool) -> None:
+        """Add first-order changes by deviations of what is read, or of the machine, in place."""
+        known, slopes = self.directions_of(number)
+        chosen = {item.coordinate for item in self.misdescribed if item.of_sensor is of_sensor}
+        predicted.add([name if name in chosen else "" for name in known], slopes, *told)
 
     def directions_of(self, number: int) -> tuple[list[str], Array]:
         """Coordinates of directions that do something in a recording, and what they do, (G + 1, c, k) K."""

@@ -201,7 +201,7 @@ DECIDED, LIKELIER_RIGHT = 0.75, 0.5
 # in every channel (root mean square), all readings are less than LEAST_HELDOUT_GAIN for the first, and
 # evidence gives the other the third. The second, a difference of misfits, bounds what is fitted again for
 # this, and what a plan counts as told apart.
-NEAR_READINGS, NEAR_MISFIT, NEAR_PROBABILITY = 0.22, 14.0, 0.01
+NEAR_READINGS, NEAR_MISFIT, NEAR_PROBABILITY = 0.5, 14.0, 0.01
 # Probability from which another set is listed.
 LISTED = 0.02
 # Level of the p-value below which something is missing, and below which nothing missing is ruled out;

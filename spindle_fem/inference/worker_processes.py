@@ -63,15 +63,15 @@ class Workers:
 
     def __init__(self, number: int = 1) -> None:
         self._number, self._pool = number, WorkerPool(number)
-        self._shared: Shared[Problem] | None = None
+        self._shared: dict[int, Shared[Problem]] = {}
 
     def wake(self) -> None:
         """Start the other processes, where that takes them seconds, while this one has other things to do."""
         if not can_be_copied():
             self._pool.wake()
 
-    def fits(self, problem: Problem, orders: Sequence[FitOrder]) -> list[Fit | None]:
-        """Fits in the order given, with the candidates that were given."""
+    def fits(self, problem: Problem | Sequence[Problem], orders: Sequence[FitOrder]) -> list[Fit | None]:
+        """Fits in the order given, with the candidates that were given; to one problem or each to its own."""
         fits = self.done(problem, [partial(fit_order, order=order) for order in orders])
         # Candidates are identified by object; those that come back are copies.
         return [
@@ -79,19 +79,31 @@ class Workers:
             for fit, order in zip(fits, orders, strict=True)
         ]
 
-    def done(self, problem: Problem, jobs: Sequence[Callable[[Problem], Any]]) -> list[Any]:
+    def done(
+        self, problem: Problem | Sequence[Problem], jobs: Sequence[Callable[[Problem], Any]]
+    ) -> list[Any]:
         """Result of each job on the problem, in order.
 
         Parameters
         ----------
+        problem : Problem or sequence of Problem
+            One for all jobs, or one for each.
         jobs : sequence of callable
             That can be sent to another process: functions of modules, perhaps with some arguments given.
         """
+        problems = [problem] * len(jobs) if isinstance(problem, Problem) else problem
         if can_be_copied():
-            return in_copies([partial(job, problem) for job in jobs], self._number)
-        if self._shared is None or self._shared.value is not problem:
-            self._shared = Shared(problem)
-        return self._pool.map([partial(_on_problem, self._shared, job) for job in jobs])
+            return in_copies(
+                [partial(job, own) for job, own in zip(jobs, problems, strict=True)], self._number
+            )
+        known = {
+            key: item for key, item in self._shared.items() if any(item.value is own for own in problems)
+        }
+        self._shared = known | {id(own): Shared(own) for own in problems if id(own) not in known}
+        orders = [
+            partial(_on_problem, self._shared[id(own)], job) for job, own in zip(jobs, problems, strict=True)
+        ]
+        return self._pool.map(orders)
 
     def ahead(self, job: Callable[[], Any]) -> Callable[[], Any]:
         """Start a job in another process; the returned function waits for what it makes.

@@ -7,7 +7,7 @@ import pytest
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.inference import search_course, tuned
-from spindle_fem.inference.diagnosis import few_of_each
+from spindle_fem.inference.final_fits import few_of_each
 from spindle_fem.inference.findings import findings_of
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked
 from spindle_fem.inference.hypothesis_fit import Problem

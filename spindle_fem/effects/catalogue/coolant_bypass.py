@@ -39,6 +39,8 @@ class MixedOutlet(Reading):
         The name is the term's: both share one fraction.
     """
 
+    before_sensor = True
+
     def __init__(self, channel: str, name: str) -> None:
         self.channel, self.name, self.parameters = channel, name, (FRACTION,)
 

@@ -55,11 +55,14 @@ class Reading(ABC):
         Column of the recording.
     name : str
         Outer names of the parameters are ``<name>.<parameter>``.
+    before_sensor : bool
+        Whether it is what reaches the sensor that differs, which the sensor reads as any other.
     """
 
     channel: str = ""
     name: str = ""
     parameters: tuple[TermParameter, ...] = ()
+    before_sensor: bool = False
 
     @abstractmethod
     def read(

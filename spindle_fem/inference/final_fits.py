@@ -1,0 +1,122 @@
+"""Final fits: which sets of a search are fitted again on the whole basis, each about its own machine."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from spindle_fem.inference import tuned
+from spindle_fem.inference.followed_readings import FollowedReadings
+from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
+from spindle_fem.inference.like_sets import may_stand_for
+from spindle_fem.inference.other_answers import with_other_answers
+from spindle_fem.inference.set_problems import SetProblems
+from spindle_fem.inference.verdict import tempered
+from spindle_fem.inference.worker_processes import FitOrder, Workers
+
+
+def few_of_each(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Sets without more than a few places and forms of one combination of effects, which hide the others."""
+    seen: Counter[tuple[str, ...]] = Counter()
+    found = []
+    for item in ranked:
+        names = tuple(sorted(c.effect for c in item.fit.candidates))
+        seen[names] += 1
+        if seen[names] <= tuned.REFITTED_OF_EACH:
+            found.append(item)
+    return found
+
+
+def to_be_fitted(
+    problem: Problem,
+    found: Sequence[Hypothesis],
+    overlapping: Mapping[str, frozenset[str]],
+    coarseness: float,
+) -> list[Hypothesis]:
+    """The most probable hypotheses, the first of them first, what reads nearly as it, and the empty one."""
+    score = {id(h): value for h, value in zip(found, tempered(found, coarseness), strict=True)}
+    everything = sorted(found, key=lambda h: -score[id(h)])
+    # Whether anything is missing is a separate question (the p-value): here sets are compared.
+    ranked = [h for h in everything if h.keys] or everything
+    best = score[id(ranked[0])]
+    # Links of a network differ by more than spots of a machine do.
+    different = few_of_each(ranked) if coarseness == 1.0 else ranked
+    chosen = [
+        item
+        for position, item in enumerate(different[: tuned.REFITTED])
+        if position < tuned.ALWAYS_REFITTED or score[id(item)] > best - tuned.NEGLIGIBLE_SCORE
+    ]
+    # The slow error has changed since the search: test again whether the best set needs each member.
+    members = ranked[0].keys
+    smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
+    chosen += [h for h in smaller if h not in chosen]
+    for size in range(len(members)):
+        chosen += [h for h in everything if len(h.fit.candidates) == size and h not in chosen][:1]
+    first = ranked[0].fit
+    rivals = [
+        h
+        for h in ranked
+        if h not in chosen
+        and may_stand_for(h.fit, first, overlapping)
+        and h.fit.misfit_with_prior < first.misfit_with_prior + tuned.NEAREST_WITHIN * tuned.NEAR_MISFIT
+    ]
+    readings = FollowedReadings(SetProblems(problem, problem))
+    nearest = sorted((readings.apart(first, h.fit), i, h) for i, h in enumerate(rivals))
+    chosen += [
+        h
+        for distance, _, h in nearest[: tuned.NEAREST_REFITTED]
+        if distance < tuned.NEAREST_WITHIN * tuned.NEAR_READINGS
+    ]
+    return chosen
+
+
+def fitted_sets(problems: SetProblems, chosen: Sequence[Hypothesis], workers: Workers) -> list[Hypothesis]:
+    """Hypotheses fitted on the whole basis, each to its own problem; the first one first."""
+    first = chosen[0]
+    # Sets far behind the first need not be fitted to their optimum, but for its parts: they are what is
+    # named where the rest of it is not needed.
+    begun = problems.of(first.fit).cost_at(first.fit.candidates, first.fit.values)
+    behind = begun + 2.0 * tuned.HOPELESS_SCORE
+    orders = [
+        FitOrder(
+            h.fit.candidates, h.fit.values, iterations=12, hopeless=np.inf if h.keys < first.keys else behind
+        )
+        for h in chosen
+    ]
+    # A set that could be simulated on the search's basis may run away on the whole one, and is dropped then.
+    fitted = [
+        replace(item, fit=fit)
+        for fit, item in zip(workers.fits([problems.of(h.fit) for h in chosen], orders), chosen, strict=True)
+        if fit is not None
+    ]
+    fitted = with_other_answers(
+        problems, [_begun_with_more(problems.of(h.fit), h, fitted) for h in fitted], workers
+    )
+    return sorted(fitted, key=lambda h: -h.score)
+
+
+def _begun_with_more(problem: Problem, item: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis:
+    """A set fitted again from where one that holds more ended, if it begins better there.
+
+    Where a further member does nothing, the fit of the rest has ended elsewhere.
+    """
+    for more in fitted:
+        if item.keys < more.keys and problem.begins_better(item.fit, more.fit.values):
+            item = replace(item, fit=problem.fit(item.fit.candidates, more.fit.values))
+    return item
+
+
+def likelier_about(problem: Problem, fit: Fit) -> bool:
+    """Whether a set is likelier by what directions do in another problem than in that of its own fit.
+
+    By more than what a fit that begins at the end of another gains anyway: all sets are fitted again then.
+    """
+    try:
+        again = problem.fit(fit.candidates, fit.values)
+    except NOT_SIMULATED:
+        return False
+    return again.misfit_with_prior < fit.misfit_with_prior - 2.0 * tuned.WORTH_ANOTHER
