@@ -42,6 +42,7 @@ def run_search(search: Search) -> list[Hypothesis]:
             tuned.SINGLES_FITTED[len(starts) - 1],
             always=tuned.SINGLES_ALWAYS_FITTED,
         )
+    search.fit_all(_far_off(search, null))
     is_network = search.problem.predictor.is_network
     if is_network:
         _what_changes(search, starts[-1][0])
@@ -73,6 +74,27 @@ def run_search(search: Search) -> list[Hypothesis]:
         # What was found beside a law may explain all that the law did.
         reduced(search)
     return search.ranked()
+
+
+def _far_off(search: Search, null: Fit) -> list[Task]:
+    """Effects that the fit of nothing missing takes for small errors, where it has those large.
+
+    What it has of them is as good as the effect to first order, so that a screening does not show it.
+    """
+    values = null.values
+    large = [
+        (item, values[item.coordinate])
+        for item in search.problem.predictor.misdescribed
+        if item.far_off and abs(values.get(item.coordinate, 0.0)) > tuned.FAR_OFF * item.sigma
+    ]
+    return [
+        ((candidate,), values | {item.coordinate: 0.0, candidate.amplitude: value})
+        for item, value in large
+        for candidate in search.candidates
+        if candidate.reading is not None
+        and candidate.reading.channel == item.far_off.get(candidate.effect)
+        and candidate.parameters[candidate.amplitude].low < value
+    ]
 
 
 def _beam(search: Search, best: Hypothesis, size: int) -> int:

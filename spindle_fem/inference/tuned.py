@@ -115,6 +115,8 @@ EXPLAINED = 1.03
 DISTORTED = 1.2
 # Sets that are fitted from each start: singles (from the only start; from each of two), pairs, triples.
 SINGLES_FITTED, PAIRS_FITTED, TRIPLES_FITTED = (8, 5), 6, 3
+# Standard deviations from which an error of a sensor is tried as an effect of the catalogue.
+FAR_OFF = 2.5
 # This many singles are fitted whatever they promise; others need this gain, and this share of the best's.
 SINGLES_ALWAYS_FITTED, LEAST_PROMISED_GAIN, LEAST_PROMISED_SHARE = 4, 4.0, 0.35
 # By how much less that may be beside the best set: small ones gain 5 to 8 more there, fitted, than promised.
