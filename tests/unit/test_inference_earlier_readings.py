@@ -12,6 +12,7 @@ from spindle_fem.inference.followed_readings import FollowedReadings
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate
+from spindle_fem.inference.set_problems import SetProblems
 from spindle_fem.inference.tuned import INTERVAL_WIDENING
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.network_inputs import fast_network
@@ -142,11 +143,11 @@ def test_what_a_fit_gives_up_of_a_calibration_counts_beside_what_it_leaves(calib
     at_fit = known.earlier.given_up(known.coordinates, known.start)
     assert max(at_fit.misfit, at_fit.left, at_fit.error) < 1e-6
     final = Problem(predictor, known, found.slow, predictor.observations)
-    readings = FollowedReadings(final, final)
+    readings = FollowedReadings(SetProblems(final, final))
     drifted = Problem(predictor, found.belief, found.slow, predictor.observations).fit()
     given = known.earlier.given_up(known.coordinates, drifted.position)
     assert min(given.misfit, given.left, given.error) > 1.0
     alone = Problem(predictor, found.belief, found.slow, predictor.observations)
     assert readings.left(drifted) ** 2 == pytest.approx(
-        FollowedReadings(alone, alone).left(drifted) ** 2 + given.left
+        FollowedReadings(SetProblems(alone, alone)).left(drifted) ** 2 + given.left
     )

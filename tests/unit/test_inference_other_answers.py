@@ -20,6 +20,7 @@ COORDINATES = (
     Coordinate(SIZE, 0.0, 0.1, False, 0.0, np.inf, ""),
     Coordinate(CLEARANCE, 5.0e-6, 1.0e-5, False, -2.0, 4.0, "m"),
 )
+PROBLEMS = SimpleNamespace(of=lambda fit: None)
 STARTS = tuple({CLEARANCE: clearance} for clearance in (5.0e-6, 18.0e-6, 31.0e-6))
 
 
@@ -56,7 +57,7 @@ def answered(first, by_start, effect="thermal_preload"):
         asked.extend(round(1e6 * order.start[CLEARANCE]) for order in orders)
         return [by_start[round(1e6 * order.start[CLEARANCE])] for order in orders]
 
-    (found,) = with_other_answers(None, [Hypothesis(first, -1.0)], SimpleNamespace(fits=fits))
+    (found,) = with_other_answers(PROBLEMS, [Hypothesis(first, -1.0)], SimpleNamespace(fits=fits))
     return found.fit, asked
 
 
@@ -87,7 +88,10 @@ def test_sets_far_behind_and_effects_of_one_answer_are_left_alone():
     other = fit_at(4.0, effect="starvation")
     sets = [Hypothesis(other, -1.0), Hypothesis(behind, -1.0)]
     nothing = SimpleNamespace(fits=lambda problem, orders: [pytest.fail("fitted") for _ in orders])
-    assert [h.fit for h in with_other_answers(None, sets, nothing)] == [other, behind]
+    assert [h.fit for h in with_other_answers(PROBLEMS, sets, nothing)] == [
+        other,
+        behind,
+    ]
 
 
 @pytest.mark.parametrize(("loose", "asked"), [(90.0, [18, 31, 20]), (110.0, [18, 31])])
@@ -101,7 +105,7 @@ def test_a_set_that_holds_a_likelier_one_begins_where_that_moved(loose, asked):
         return [replace(e, candidates=o.candidates) for e, o in zip(ends, orders, strict=True)]
 
     sets = [Hypothesis(fit_at(4.0), -1.0), Hypothesis(more, -1.0)]
-    part, whole = with_other_answers(None, sets, SimpleNamespace(fits=fits))
+    part, whole = with_other_answers(PROBLEMS, sets, SimpleNamespace(fits=fits))
     assert begun == asked
     assert clearance_of(part.fit) == clearance_of(whole.fit) == pytest.approx(20.0 if loose < 100.0 else 4.0)
 

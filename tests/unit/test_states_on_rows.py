@@ -14,6 +14,7 @@ from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.opened_machine import open_machine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate
+from spindle_fem.inference.set_problems import SetProblems
 from spindle_fem.inference.state_search import BLUR, add_states, inferred_states, states_on_rows
 from spindle_fem.recordings.align import read_recording
 from tests.support.flawed_network import DURATION, MACHINE, record
@@ -73,7 +74,7 @@ def test_what_switches_within_a_step_of_the_fit_is_found_on_the_rows(tmp_path, m
     assert score["steps"] < 0.9
     assert score["rows"] > 0.97
     # On the steps of the fit, the same state has the size that it has.
-    readings = FollowedReadings(problem, problem)
+    readings = FollowedReadings(SetProblems(problem, problem))
     followed = readings.with_states(fit, states["rows"])
     assert readings.left_with(followed) < 0.8 * readings.left_with(readings.with_states(fit, states["steps"]))
     (candidate,) = followed.fit.candidates

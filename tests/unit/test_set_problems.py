@@ -1,0 +1,107 @@
+"""What drawings leave open, about the machine with each set: on the lumped spindle."""
+
+import numpy as np
+import pytest
+
+from spindle_fem.effects.catalogue.coolant_bypass import MIXED
+from spindle_fem.effects.registry import candidates_for
+from spindle_fem.errors import ConvergenceError
+from spindle_fem.inference import search_course, tuned
+from spindle_fem.inference.coolant_misdescriptions import StandingCoolant
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
+from spindle_fem.inference.heat_misdescriptions import SpeedShape
+from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
+from spindle_fem.inference.set_problems import SetProblems, members_of
+from spindle_fem.inference.worker_processes import Workers
+from tests.support.diagnosed_spindle import Case
+
+FRONT = ("F1", "F2", "F3")
+MORE_HEAT = Misdescription("heat", "", "", 0.1, "", SpeedShape(FRONT, (0.0, 1000.0), (0.0, 1.0)))
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    return Case(tmp_path_factory.mktemp("sets"))
+
+
+@pytest.fixture(scope="module")
+def problem(case):
+    predictor = with_misdescriptions(Predictor(case.fast, [case.blank]), [MORE_HEAT])
+    return Problem(predictor, calibrate(None, predictor).known, EXPECTED_SLOW, predictor.observations)
+
+
+def column(problem):
+    return problem.predictor.column_of(0, MORE_HEAT.coordinate)
+
+
+@pytest.fixture(scope="module")
+def dry(case, problem):
+    """A fit of little heat in front, of which a table that is off has less as well."""
+    starved = case.candidates["heat_scale", "front_bearings"]
+    values = {EFFECT_PREFIX + f.name: 0.3 for f in starved.factors}
+    return problem.fit([starved], values, iterations=0)
+
+
+def test_a_set_has_what_directions_do_to_its_own_machine(problem, dry):
+    problems = SetProblems(problem, problem).about([problem.fit(iterations=0), dry], Workers())
+    own = with_misdescriptions(problem.predictor, [MORE_HEAT], dry.values, dry.candidates)
+    np.testing.assert_array_equal(
+        column(problems.of(dry)), column(Problem(own, problem.belief, problem.slow, own.observations))
+    )
+    # Three tenths of the heat: as much less of what a table does.
+    assert np.abs(column(problems.of(dry))).max() < 0.5 * np.abs(column(problem)).max()
+    assert problems.of(problem.fit(iterations=0)) is problem
+    assert problems.about([dry], Workers()).own == problems.own
+
+
+def test_a_set_that_cannot_be_simulated_has_what_the_first_has(monkeypatch, problem, dry):
+    def fails(*ignored):
+        raise ConvergenceError("the set", "no steady state")
+
+    monkeypatch.setattr("spindle_fem.inference.set_problems.columns_about", fails)
+    problems = SetProblems(problem, problem).about([dry], Workers())
+    assert problems.of(dry) is problem
+    assert members_of(dry) not in problems.own
+
+
+def test_coolant_that_stood_before_the_sensor_is_read_whole_behind_a_bypass(case):
+    """What the channel does later is mixed with what passed it by."""
+    bypass = next(c for c in candidates_for(case.view) if c.effect == "coolant_bypass" and c.form == MIXED)
+    values = {bypass.amplitude: 0.9}
+    stood = Misdescription("stood", "", "K", 3.0, "", StandingCoolant("COOLANT_OUT", 100.0), of_sensor=True)
+    predictor = with_misdescriptions(Predictor(case.fast, [case.blank]), [stood, MORE_HEAT], values, [bypass])
+    names = [stood.coordinate, MORE_HEAT.coordinate]
+    told = predictor.predict(0, values, [bypass], names).sensitivity[:, -1]
+    np.testing.assert_allclose(told[:, 0], predictor.column_of(0, names[0])[:, -1])
+    np.testing.assert_allclose(told[:, 1], 0.1 * predictor.column_of(0, names[1])[:, -1], atol=1e-12)
+    moved = predictor.predict(0, values | {names[0]: 2.0}, [bypass]).temperature[:, -1]
+    plain = predictor.predict(0, values, [bypass]).temperature[:, -1]
+    np.testing.assert_allclose(moved - plain, 2.0 * told[:, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "tried"),
+    [(1.1, {"clock_shift", "sensor_lag"}), (-1.1, {"clock_shift"}), (0.9, set())],
+)
+def test_a_large_delay_of_a_sensor_is_tried_as_its_effects(case, seconds, tried):
+    plain = Predictor(case.fast, [case.blank])
+    late = next(i for i in misdescriptions_of(plain) if i.name == "response.SP02")
+    predictor = with_misdescriptions(plain, [late])
+    problem = Problem(predictor, calibrate(None, predictor).known, EXPECTED_SLOW, predictor.observations)
+    value = seconds * tuned.FAR_OFF * late.sigma
+    null = problem.fit((), {late.coordinate: value}, iterations=0)
+
+    class Search:
+        candidates = candidates_for(case.view)
+
+    Search.problem = problem
+    tasks = search_course._far_off(Search, null)
+    assert {members[0].effect for members, _ in tasks} == tried
+    for (member,), start in tasks:
+        assert member.component == "SP02"
+        assert start[member.amplitude] == pytest.approx(value)
+        assert start[late.coordinate] == 0.0
