@@ -36,7 +36,7 @@ from spindle_fem.inference.prepared_problem import (
 )
 from spindle_fem.inference.search_basis import searched_predictor
 from spindle_fem.inference.search_course import run_search
-from spindle_fem.inference.set_problems import SetProblems, members_of
+from spindle_fem.inference.set_problems import SetProblems, combination_of
 from spindle_fem.inference.state_search import InferredState, inferred_states, states_on_rows
 from spindle_fem.inference.verdict import Judgement, judge, rank
 from spindle_fem.inference.worker_processes import Workers
@@ -208,7 +208,7 @@ def diagnose_recordings(
     about_first = Problem(predictor, belief, slow, predictor.observations)
     overlapping = overlapping_components(view)
     sets = to_be_fitted(about_first, found, overlapping, coarseness)
-    problems = SetProblems(about_first, about_first, {members_of(best.fit): about_first})
+    problems = SetProblems(about_first, about_first, {combination_of(best.fit): about_first})
     problems = problems.about([h.fit for h in sets], workers)
     refitted = fitted_sets(problems, sets, workers)
     own = own_fit()

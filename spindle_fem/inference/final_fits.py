@@ -14,7 +14,7 @@ from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.like_sets import may_stand_for
 from spindle_fem.inference.other_answers import with_other_answers
-from spindle_fem.inference.set_problems import SetProblems
+from spindle_fem.inference.set_problems import SetProblems, combination_of
 from spindle_fem.inference.verdict import tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 
@@ -24,7 +24,7 @@ def few_of_each(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
     seen: Counter[tuple[str, ...]] = Counter()
     found = []
     for item in ranked:
-        names = tuple(sorted(c.effect for c in item.fit.candidates))
+        names = combination_of(item.fit)
         seen[names] += 1
         if seen[names] <= tuned.REFITTED_OF_EACH:
             found.append(item)

@@ -33,36 +33,42 @@ class SetProblems:
     first : Problem
         Of every set that has none of its own.
     own : mapping
-        Of other sets, by the amplitudes of their members.
+        Of other sets, by their effects.
     """
 
     plain: Problem
     first: Problem
-    own: Mapping[frozenset[str], Problem] = field(default_factory=dict)
+    own: Mapping[tuple[str, ...], Problem] = field(default_factory=dict)
 
     def of(self, fit: Fit) -> Problem:
         """The problem that a fit is of."""
-        return self.own.get(members_of(fit), self.first) if fit.candidates else self.plain
+        return self.own.get(combination_of(fit), self.first) if fit.candidates else self.plain
 
     def about(self, fits: Sequence[Fit], workers: Workers) -> SetProblems:
-        """With one of its own for every other set that can be simulated on the whole basis."""
+        """With one of its own for every other combination of effects, about the first set of each.
+
+        Combinations that cannot be simulated on the whole basis have that of the first set.
+        """
         directions = self.first.predictor.misdescribed
-        new = {members_of(fit): fit for fit in fits if fit.candidates and members_of(fit) not in self.own}
+        new: dict[tuple[str, ...], Fit] = {}
+        for fit in fits:
+            if fit.candidates and combination_of(fit) not in self.own:
+                new.setdefault(combination_of(fit), fit)
         if not new or not directions:
             return self
         jobs = [partial(_columns, values=fit.values, candidates=fit.candidates) for fit in new.values()]
         own = dict(self.own)
-        for (members, fit), columns in zip(new.items(), workers.done(self.first, jobs), strict=True):
+        for (names, fit), columns in zip(new.items(), workers.done(self.first, jobs), strict=True):
             if columns is not None:
                 about = fit.values, fit.candidates
                 predictor = self.first.predictor.misdescribed_by(directions, columns, about)
-                own[members] = replace(self.first, predictor=predictor)
+                own[names] = replace(self.first, predictor=predictor)
         return SetProblems(self.plain, self.first, own)
 
 
-def members_of(fit: Fit) -> frozenset[str]:
-    """What a set is known by here, whatever intervals its members have."""
-    return frozenset(candidate.amplitude for candidate in fit.candidates)
+def combination_of(fit: Fit) -> tuple[str, ...]:
+    """Effects of a set, wherever they are and whatever their forms: directions do much the same then."""
+    return tuple(sorted(candidate.effect for candidate in fit.candidates))
 
 
 def _columns(

@@ -15,7 +15,7 @@ from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
-from spindle_fem.inference.set_problems import SetProblems, members_of
+from spindle_fem.inference.set_problems import SetProblems, combination_of
 from spindle_fem.inference.worker_processes import Workers
 from tests.support.diagnosed_spindle import Case
 
@@ -65,7 +65,7 @@ def test_a_set_that_cannot_be_simulated_has_what_the_first_has(monkeypatch, prob
     monkeypatch.setattr("spindle_fem.inference.set_problems.columns_about", fails)
     problems = SetProblems(problem, problem).about([dry], Workers())
     assert problems.of(dry) is problem
-    assert members_of(dry) not in problems.own
+    assert combination_of(dry) not in problems.own
 
 
 def test_coolant_that_stood_before_the_sensor_is_read_whole_behind_a_bypass(case):
