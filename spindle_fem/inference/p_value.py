@@ -53,6 +53,18 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int, coarseness:
     return float(-np.expm1((1.0 + trials / tuned.CANDIDATES_A_TRIAL) * np.log1p(-single)))
 
 
+def heldout_p_value(chosen: Hypothesis, null: Hypothesis) -> float:
+    """Bound of that probability by held-out readings, for a set that fitted ones chose; 1 without any.
+
+    Where nothing is missing, a likelihood of readings to come is x times that which they have once in x times
+    at most, by Markov's inequality. Gains count as :func:`~spindle_fem.inference.verdict.tempered` has them.
+    Source: Robbins (1970), Ann. Math. Statist. 41, 1397-1409.
+    """
+    if chosen.heldout is None or null.heldout is None:
+        return 1.0
+    return float(np.exp(-0.5 * max(0.0, null.heldout - chosen.heldout) / tuned.GAIN_DIVISOR))
+
+
 def closer_periods(fit: Fit) -> tuple[int, float]:
     """Number of fitted periods, and logarithm of how many times closer they are known than before.
 

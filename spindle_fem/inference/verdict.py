@@ -23,7 +23,7 @@ from spindle_fem.inference.like_sets import (
     may_stand_for,
     with_needed_thirds,
 )
-from spindle_fem.inference.p_value import detection_p_value
+from spindle_fem.inference.p_value import detection_p_value, heldout_p_value
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
 
 Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"]
@@ -231,7 +231,12 @@ def judge(
     ranked = rank(hypotheses, coarseness)
     p_value = detection_p_value(hypotheses, trials, coarseness)
     empty = next(item for item in ranked if not item.fit.candidates)
-    fitted = {i.fit.named_keys: i for i in rank([replace(h, heldout=None) for h in hypotheses], coarseness)}
+    by_fitted = rank([replace(h, heldout=None) for h in hypotheses], coarseness)
+    fitted = {i.fit.named_keys: i for i in by_fitted}
+    likeliest = next((i.fit for i in by_fitted if i.fit.candidates), None)
+    if coarseness == 1.0 and likeliest is not None:
+        first = next(h for h in hypotheses if h.fit is likeliest)
+        p_value = min(p_value, heldout_p_value(first, empty.best))
     odds = {keys: _log_odds(item, fitted[empty.fit.named_keys]) for keys, item in fitted.items()}
     nothing = 0.0
     if p_value <= tuned.SIGNIFICANT:

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.inference import tuned
 from spindle_fem.inference.p_value import detection_p_value
-from tests.support.made_hypotheses import CHURNING, PRELOAD, candidate, hypothesis
+from tests.support.made_hypotheses import CHURNING, PRELOAD, candidate, hypothesis, verdict
 
 
 def test_the_p_value_corrects_for_the_number_of_trials():
@@ -71,3 +71,19 @@ def test_p_values_of_pure_chance_are_seldom_small():
         found += [hypothesis(PRELOAD, misfit=400.0 - gain) for gain in gains]
         low += detection_p_value(found, 40) < 0.01
     assert low <= 10
+
+
+def test_what_held_out_readings_alone_make_likely_is_not_consistent():
+    """A small effect of a long recording may tell little of fitted readings and much of all."""
+    nothing, preload = replace(hypothesis(misfit=2000.0), heldout=700.0), hypothesis(PRELOAD, misfit=1990.0)
+    worse = replace(hypothesis(CHURNING, misfit=1996.0), heldout=600.0)
+    assert verdict(nothing, preload).p_value > tuned.SIGNIFICANT
+    gain = 2.0 * tuned.GAIN_DIVISOR * np.log(1.0 / tuned.RULED_OUT)
+    told = verdict(nothing, replace(preload, heldout=700.0 - 1.1 * gain))
+    assert told.verdict == "missing_physics"
+    assert told.p_value == pytest.approx(tuned.RULED_OUT**1.1)
+    # the set is that of fitted readings: the best of many by held-out ones would be chance
+    same = replace(preload, heldout=700.0)
+    assert verdict(nothing, same, worse).p_value > tuned.SIGNIFICANT
+    # a network is a coarse picture
+    assert verdict(nothing, replace(preload, heldout=600.0), coarseness=1.1).p_value > tuned.SIGNIFICANT
