@@ -412,6 +412,9 @@ def test_without_copies_a_problem_is_sent_to_other_processes_once_and_this_one_f
         assert all(item is problem for item in here)
     workers.fits(problems[1], orders[:1])
     assert len(sent) == 2
+    # Sets with a problem each: what is known already is not sent again.
+    assert [fit.candidates[0] for fit in workers.fits(problems, orders)] == offsets
+    assert sum(item is problems[1] for item in sent) == 1
 
 
 def test_a_set_that_cannot_be_simulated_begins_milder(machine, tmp_path, monkeypatch):
