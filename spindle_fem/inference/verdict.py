@@ -248,7 +248,10 @@ def judge(
         nothing = min(empty.probability, tuned.STILL_POSSIBLE)
 
     def predicts(item: Ranked) -> bool:
-        return _predicts(item.best, empty.best, left, beyond, coarseness, odds[item.fit.named_keys])
+        ruled_out = p_value < tuned.RULED_OUT
+        return _predicts(
+            item.best, empty.best, left, beyond, coarseness, odds[item.fit.named_keys], ruled_out
+        )
 
     improved, kept = predicts(chosen), ranked
     if chosen.fit.candidates and not improved:
@@ -351,12 +354,14 @@ def _predicts(
     beyond: Callable[[Fit], float],
     coarseness: float,
     odds: float,
+    ruled_out: bool,
 ) -> bool:
     """Whether held-out readings speak for a set: by themselves, or with what the fitted ones say.
 
     They are a third of the fitted ones, and of a small effect seen by few sensors tell less than its odds by
     those. What they say against a set counts as well: the sum must be twenty to one. A set that leaves as
-    much of all readings as nothing missing only makes the machine likelier, which is not enough.
+    much of all readings as nothing missing only makes the machine likelier, which is not enough unless
+    chance hardly leaves such a machine (``ruled_out``).
     A coarse model leaves more than noise, so that likelihoods exaggerate: for a network the residual
     counts, that of fitted readings too, and sensors' white noise hides less of it. If the fit without effects
     leaves only noise, with directions far from their priors, a smaller residual does not count.
@@ -371,7 +376,7 @@ def _predicts(
         return gain >= tuned.LEAST_HELDOUT_GAIN
     # A quarter of the readings is held out by default.
     rest, before = (np.sqrt(3.0 * left(fit) ** 2 + beyond(fit) ** 2) for fit in (chosen.fit, empty.fit))
-    lower = rest <= (1.0 - tuned.LEAST_IMPROVEMENT_DRAWN) * before
+    lower = ruled_out or rest <= (1.0 - tuned.LEAST_IMPROVEMENT_DRAWN) * before
     return lower and max(gain, gain + odds) >= tuned.LEAST_HELDOUT_GAIN
 
 
