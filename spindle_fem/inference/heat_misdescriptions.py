@@ -192,7 +192,7 @@ def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
             f"time by which {channel} answers later than the machine",
             Response(channel),
             of_sensor=True,
-            far_off={"clock_shift": channel, "sensor_lag": channel},
+            delays=channel,
         )
     for number in range(len(predictor.recordings)):
         yield Misdescription(

@@ -7,8 +7,8 @@ physics.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -61,8 +61,8 @@ class Misdescription:
     of_sensor : bool
         Whether it is what is read that differs, not the machine: far off it is an effect of the catalogue,
         no wrong definition.
-    far_off : mapping of str to str
-        Effects that it is when it is large, and the channel of each; their amplitudes have its unit.
+    delays : str
+        Channel that it makes late, where it does so; by much that is an effect of the catalogue.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Misdescription:
     change: Callable[[Any], Change]
     recording: int | None = None
     of_sensor: bool = False
-    far_off: Mapping[str, str] = field(default_factory=dict)
+    delays: str = ""
 
     @property
     def coordinate(self) -> str:

@@ -77,23 +77,23 @@ def run_search(search: Search) -> list[Hypothesis]:
 
 
 def _far_off(search: Search, null: Fit) -> list[Task]:
-    """Effects that the fit of nothing missing takes for small errors, where it has those large.
+    """Effects that make a channel late, where the fit of nothing missing takes a large one for a small error.
 
-    What it has of them is as good as the effect to first order, so that a screening does not show it.
+    To first order what it has of the error is as good as the effect, so that a screening does not show it.
     """
     values = null.values
-    large = [
+    late = [
         (item, values[item.coordinate])
         for item in search.problem.predictor.misdescribed
-        if item.far_off and abs(values.get(item.coordinate, 0.0)) > tuned.FAR_OFF * item.sigma
+        if item.delays and abs(values.get(item.coordinate, 0.0)) > tuned.FAR_OFF * item.sigma
     ]
     return [
-        ((candidate,), values | {item.coordinate: 0.0, candidate.amplitude: value})
-        for item, value in large
+        ((candidate,), values | {item.coordinate: 0.0, candidate.amplitude: seconds})
+        for item, seconds in late
         for candidate in search.candidates
-        if candidate.reading is not None
-        and candidate.reading.channel == item.far_off.get(candidate.effect)
-        and candidate.parameters[candidate.amplitude].low < value
+        if search.effects[candidate.effect].delays
+        and candidate.reading.channel == item.delays
+        and candidate.parameters[candidate.amplitude].low < seconds
     ]
 
 

@@ -1,10 +1,12 @@
 """What drawings leave open, about the machine with each set: on the lumped spindle."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from spindle_fem.effects.catalogue.coolant_bypass import MIXED
-from spindle_fem.effects.registry import candidates_for
+from spindle_fem.effects.registry import candidates_for, catalogue
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.inference import search_course, tuned
 from spindle_fem.inference.coolant_misdescriptions import StandingCoolant
@@ -95,11 +97,8 @@ def test_a_large_delay_of_a_sensor_is_tried_as_its_effects(case, seconds, tried)
     value = seconds * tuned.FAR_OFF * late.sigma
     null = problem.fit((), {late.coordinate: value}, iterations=0)
 
-    class Search:
-        candidates = candidates_for(case.view)
-
-    Search.problem = problem
-    tasks = search_course._far_off(Search, null)
+    search = SimpleNamespace(problem=problem, candidates=candidates_for(case.view), effects=catalogue())
+    tasks = search_course._far_off(search, null)
     assert {members[0].effect for members, _ in tasks} == tried
     for (member,), start in tasks:
         assert member.component == "SP02"

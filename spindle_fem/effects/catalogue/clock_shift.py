@@ -34,6 +34,7 @@ class ClockShift(SensorEffect):
 
     name = "clock_shift"
     reading_kind = ShiftedReading
+    delays = True
     title = "the channel's clock is off"
     check = (
         "Clocks and time zones of the loggers, buffering and averaging on the way; give both one common mark."

@@ -39,6 +39,7 @@ class SensorLag(SensorEffect):
 
     name = "sensor_lag"
     reading_kind = LagReading
+    delays = True
     title = "the sensor follows the temperature late"
     check = (
         "Seat of the sensor: is it pushed home, with thermal paste, and not in a thick well? Touch it "

@@ -234,6 +234,8 @@ class Effect(ABC):
     starts_are_answers : bool
         Whether fits from different starts may end in answers of their own, of which a single fit knows one:
         final fits then begin from every start.
+    delays : bool
+        Whether its amplitude is a time by which a channel is late, as that of every sensor is by a little.
     """
 
     name: str
@@ -245,6 +247,7 @@ class Effect(ABC):
     law_sigma: Mapping[str, float] = MappingProxyType({})
     law_shift: Mapping[str, float] = MappingProxyType({})
     starts_are_answers: bool = False
+    delays: bool = False
 
     def in_definition(self, spec: MachineSpec) -> bool:
         """Whether the definition of a machine with geometry switches it on without an ``[[effect]]``."""
