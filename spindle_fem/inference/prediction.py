@@ -55,8 +55,11 @@ class Prediction:
     def add(
         self, names: Sequence[str], slopes: Array, values: Mapping[str, float], derivatives: Sequence[str]
     ) -> None:
-        """Add what coordinates with constant slopes (G + 1, c, n) do, and derivatives by them, in place."""
-        if names:
+        """Add what coordinates with constant slopes (G + 1, c, n) do, and derivatives by them, in place.
+
+        Those without a name do nothing.
+        """
+        if any(names):
             by = np.array([values.get(name, 0.0) for name in names])
             # Of one matrix: there may be hundreds of directions.
             change = slopes.reshape(-1, len(names)) @ by
