@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,8 +95,7 @@ class BaseRun:
         self.places = np.zeros((0, predictor.fast.model.size)) if places is None else places
         self.channels = len(self.columns) + len(self.places)
         self._coefficient: dict[str, Array] = {}
-        self._told: Array | None = None
-        self._felt: Array | None = None
+        self._told: tuple[Array, Array] | None = None
 
     # ------------------------------------------------------------------ answers
     def outputs(self, tangent: Array, inlet: Array | None = None) -> Array:
@@ -246,27 +245,19 @@ class BaseRun:
 
     def predicted(self) -> Array:
         """Readings of the channels in this run, (G + 1, c) K."""
-        if self._told is None:
-            self._told = self.predictor.predict(self.number, self.values, self.candidates).temperature
-        return self._told
+        return self._passed_on()[1]
 
     def before_sensors(self) -> Array:
-        """What the channels would read if no sensor effect of the set distorted them, (G + 1, c) K.
+        """What reaches the sensors, (G + 1, c) K, before what they do wrong."""
+        return self._passed_on()[0]
 
-        A change of the machine or of what a probe feels is passed through those effects afterwards.
-        """
-        lies = [c.reading is not None and not c.reading.before_sensor for c in self.candidates]
-        if not any(lies):
-            return self.predicted()
-        if self._felt is None:
-            machine = [
-                replace(c, reading=None) if lie else c for c, lie in zip(self.candidates, lies, strict=True)
-            ]
-            shared = {name for c in machine for name in c.parameters}
-            lying = {name for c in self.candidates for name in c.parameters} - shared
-            values = {name: value for name, value in self.values.items() if name not in lying}
-            self._felt = self.predictor.predict(self.number, values, machine).temperature
-        return self._felt
+    def _passed_on(self) -> tuple[Array, Array]:
+        if self._told is None:
+            about = self.values, self.candidates
+            at_places = self.predictor.at_places(self.number, *about)
+            felt = self.predictor.pass_on(self.number, at_places, *about)
+            self._told = felt, at_places.temperature
+        return self._told
 
     def _reading(self, variant: Variant) -> Array:
         """Difference of one channel that a sensor effect makes, (G + 1, c)."""

@@ -87,17 +87,9 @@ def _end_of(predicted: Prediction, names: Sequence[str]) -> tuple[Array, dict[st
     return predicted.states[-1], dict(zip(names, slopes.T, strict=True))
 
 
-def _add(
-    predicted: Prediction,
-    directions: Sequence[Misdescription],
-    columns: Array,
-    values: Mapping[str, float],
-    names: Sequence[str],
-) -> None:
-    """Add what directions do to the readings, columns (G + 1, c, n), in place."""
-    for index, item in enumerate(directions):
-        predicted.temperature[:] += values[item.coordinate] * columns[:, :, index]
-        predicted.sensitivity[:, :, names.index(item.coordinate)] += columns[:, :, index]
+def _by_coordinate(directions: Sequence[Misdescription], columns: Array) -> dict[tuple[int, str], Array]:
+    """What directions do to the one recording of a piece, columns (G + 1, c, n), by name."""
+    return {(0, item.coordinate): columns[:, :, index] for index, item in enumerate(directions)}
 
 
 class ContinuedRun:
@@ -157,38 +149,39 @@ class ContinuedRun:
             Averages of the readings after the first row.
         """
         predictor = _Piece(self.fast, piece, self.effects, self.begun)
-        predicted = predictor.predict(0, values, (), names)
+        predicted = predictor.at_places(0, values, (), names)
         self.begun, self._run = _end_of(predicted, names), predicted.run
-        self._misdescribe(predictor, predicted, values, names)
+        self._misdescribed(predictor, values, names).pass_on(0, predicted, values, (), names)
         fresh = np.ones(piece.times.size, dtype=bool)
         fresh[0] = False
         return predicted, observe([piece], [fresh], [predictor.drives[0].grid], [width])
 
-    def _misdescribe(
-        self, predictor: Predictor, predicted: Prediction, values: Mapping[str, float], names: Sequence[str]
-    ) -> None:
-        """Add first-order changes of the readings by directions of misdescription, in place."""
+    def _misdescribed(
+        self, predictor: Predictor, values: Mapping[str, float], names: Sequence[str]
+    ) -> Predictor:
+        """The piece with what directions of misdescription do, those of earlier pieces carried on."""
         asked = [item for item in misdescriptions_of(predictor) if item.coordinate in names]
         structural = [item for item in asked if isinstance(item.change, StructuralChange)]
+        columns = {}
         if structural:
             # Their model carries them in its own state.
             model, own = model_with_directions(self.fast), [item.change.name for item in structural]
             beside = _Piece(model, predictor.recordings[0], self.effects, self._structural)
-            differs = beside.predict(0, values, (), own)
+            differs = beside.at_places(0, values, (), own)
             self._structural = _end_of(differs, own)
             amounts = np.array([item.change.amount for item in structural])
-            _add(predicted, structural, differs.sensitivity * amounts, values, names)
+            columns |= _by_coordinate(structural, differs.sensitivity * amounts)
         directions = [item for item in asked if not isinstance(item.change, StructuralChange)]
-        if not directions:
-            return
-        base = BaseRun(predictor, 0, values)
-        channels, states = direction_columns(base, directions)
-        if self._directions:
-            start = np.column_stack([self._directions[item.coordinate] for item in directions])
-            carried = base.run.tangents(np.zeros_like(states[1:]), base.tracks, start=start[None])
-            channels, states = channels + base.outputs(carried), states + carried
-        self._directions = {item.coordinate: states[-1, :, i] for i, item in enumerate(directions)}
-        _add(predicted, directions, channels, values, names)
+        if directions:
+            base = BaseRun(predictor, 0, values)
+            channels, states = direction_columns(base, directions)
+            if self._directions:
+                start = np.column_stack([self._directions[item.coordinate] for item in directions])
+                carried = base.run.tangents(np.zeros_like(states[1:]), base.tracks, start=start[None])
+                channels, states = channels + base.outputs(carried), states + carried
+            self._directions = {item.coordinate: states[-1, :, i] for i, item in enumerate(directions)}
+            columns |= _by_coordinate(directions, channels)
+        return predictor.misdescribed_by(asked, columns)
 
     def slowest_time(self) -> float:
         """Longest time constant of the machine as it ran last, s."""

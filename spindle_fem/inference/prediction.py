@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.effect import Candidate, Reading
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
+from spindle_fem.model.reduced.drive import Drive, inputs_at
 from spindle_fem.model.reduced.reduced_transient import TransientRun
 
 Array = NDArray[np.float64]
@@ -66,6 +67,31 @@ class Prediction:
             self.temperature[:] += change.reshape(self.temperature.shape)
             asked = [index for index, name in enumerate(names) if name in derivatives]
             self.sensitivity[:, :, [derivatives.index(names[i]) for i in asked]] += slopes[:, :, asked]
+
+    def read(
+        self,
+        reading: Reading,
+        channels: Sequence[str],
+        drive: Drive,
+        values: Mapping[str, float],
+        derivatives: Sequence[str],
+    ) -> None:
+        """Pass the channel of an effect of a sensor through it, in place; nothing where none has its name."""
+        if reading.channel not in channels:
+            return
+        column = channels.index(reading.channel)
+        own = {f"{reading.name}.{item.name}": item.name for item in reading.parameters}
+        asked = {own[name]: position for position, name in enumerate(derivatives) if name in own}
+        shown, slopes, by = reading.read_with_derivatives(
+            drive.times,
+            self.temperature[:, column],
+            self.sensitivity[:, column],
+            inputs_at(drive, drive.times),
+            {inner: values[outer] for outer, inner in own.items() if outer in values},
+            tuple(asked),
+        )
+        self.temperature[:, column], self.sensitivity[:, column] = shown, slopes
+        self.sensitivity[:, column, list(asked.values())] += by
 
     def slopes_at(self, places: Array) -> Array:
         """Derivatives (G + 1, n, p) of the temperatures of places (n, r) by the requested coordinates."""

@@ -40,15 +40,13 @@ from spindle_fem.inference.recording_gaps import (
     weights_of_earlier,
 )
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
-from spindle_fem.model.reduced.drive import FITTED, Drive, drive_of_recording, inputs_at
+from spindle_fem.model.reduced.drive import FITTED, Drive, drive_of_recording
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
 from spindle_fem.model.reduced.run_start import Start
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
-# Values of coordinates by name, and those to differentiate by.
-Told = tuple[Mapping[str, float], Sequence[str]]
 
 # Longest step of a diagnosed machine with geometry, s; readings are averaged over as long.
 STEP = 60.0
@@ -354,6 +352,19 @@ class Predictor:
         Derivatives are to logarithms, to values for parameters that say so.
         ``near`` is a prediction of the recording for values that are near: it begins there.
         """
+        predicted = self.at_places(number, values, candidates, derivatives, near)
+        self.pass_on(number, predicted, values, candidates, derivatives)
+        return predicted
+
+    def at_places(
+        self,
+        number: int,
+        values: Mapping[str, float],
+        candidates: Sequence[Candidate] = (),
+        derivatives: Sequence[str] = (),
+        near: Prediction | None = None,
+    ) -> Prediction:
+        """Temperatures where sensors sit, as :meth:`predict`, of the machine as defined."""
         acting, idle = acting_in(candidates, number)
         values = {name: value for name, value in values.items() if name not in idle}
         # A reading may share a parameter with its term: a bypass that joins before the outlet's sensor.
@@ -378,15 +389,31 @@ class Predictor:
         predicted = Prediction(temperature, sensitivity, found.states, run, found.tangents, owners)
         self._displace(number, predicted, values, derivatives)
         self._unseen(number, predicted, values, derivatives)
-        own = [(reading, {}, ()) for reading in self.effects.readings]
-        own += [(reading, values, derivatives) for reading in _readings(acting)]
+        return predicted
+
+    def pass_on(
+        self,
+        number: int,
+        predicted: Prediction,
+        values: Mapping[str, float],
+        candidates: Sequence[Candidate] = (),
+        derivatives: Sequence[str] = (),
+    ) -> Array:
+        """Turn temperatures of places into readings, in place; what reaches the sensors, (G + 1, c) K."""
+        names, drive = self.recordings[number].temperature_names, self.drives[number]
+        own = [(reading, NO_VALUES, ()) for reading in self.effects.readings]
+        own += [(reading, values, derivatives) for reading in _readings(acting_in(candidates, number)[0])]
+        known, slopes = self.directions_of(number)
+        kind = {item.coordinate: item.of_sensor for item in self.misdescribed}
         # What a sensor does wrong it does to what reaches it.
         for of_sensor in (False, True):
-            self._misdescribe(number, predicted, (values, derivatives), of_sensor=of_sensor)
+            felt = predicted.temperature.copy()
+            acting = [name if kind[name] is of_sensor else "" for name in known]
+            predicted.add(acting, slopes, values, derivatives)
             for reading, *told in own:
                 if reading.before_sensor is not of_sensor:
-                    self._read(number, reading, predicted, *told)
-        return predicted
+                    predicted.read(reading, names, drive, *told)
+        return felt
 
     def _displace(
         self, number: int, predicted: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
@@ -418,12 +445,6 @@ class Predictor:
                     predicted.temperature[:] += np.tensordot(slopes, earlier, 2)
                     slopes, at = np.einsum("gcnt,nt->gcn", slopes, by), NO_VALUES
                 predicted.add(names, slopes, at, derivatives)
-
-    def _misdescribe(self, number: int, predicted: Prediction, told: Told, *, of_sensor: bool) -> None:
-        """Add first-order changes by deviations of what is read, or of the machine, in place."""
-        known, slopes = self.directions_of(number)
-        chosen = {item.coordinate for item in self.misdescribed if item.of_sensor is of_sensor}
-        predicted.add([name if name in chosen else "" for name in known], slopes, *told)
 
     def directions_of(self, number: int) -> tuple[list[str], Array]:
         """Coordinates of directions that do something in a recording, and what they do, (G + 1, c, k) K."""
@@ -462,35 +483,10 @@ class Predictor:
     ) -> Array:
         """Readings of the channels if their places have the temperatures (G + 1, c)."""
         predicted = Prediction(temperature.copy(), np.zeros((*temperature.shape, 0)), np.zeros(0))
+        names, drive = self.recordings[number].temperature_names, self.drives[number]
         for reading in _readings(candidates):
-            self._read(number, reading, predicted, values, ())
+            predicted.read(reading, names, drive, values, ())
         return predicted.temperature
-
-    def _read(
-        self,
-        number: int,
-        reading: Reading,
-        predicted: Prediction,
-        values: Mapping[str, float],
-        derivatives: Sequence[str],
-    ) -> None:
-        """Pass one channel through a sensor effect, in place."""
-        names = self.recordings[number].temperature_names
-        if reading.channel not in names:
-            return
-        column, drive = names.index(reading.channel), self.drives[number]
-        own = {f"{reading.name}.{item.name}": item.name for item in reading.parameters}
-        asked = {own[name]: position for position, name in enumerate(derivatives) if name in own}
-        shown, slopes, by = reading.read_with_derivatives(
-            drive.times,
-            predicted.temperature[:, column],
-            predicted.sensitivity[:, column],
-            inputs_at(drive, drive.times),
-            {inner: values[outer] for outer, inner in own.items() if outer in values},
-            tuple(asked),
-        )
-        predicted.temperature[:, column], predicted.sensitivity[:, column] = shown, slopes
-        predicted.sensitivity[:, column, list(asked.values())] += by
 
 
 def _readings(candidates: Sequence[Candidate]) -> list[Reading]:

@@ -43,11 +43,11 @@ class StructuralChange:
 
 
 def structural_columns(base: BaseRun) -> dict[str, Array]:
-    """Change of every channel for a unit of each direction, (G + 1, c) K, by direction."""
+    """Change where every channel sits for a unit of each direction, (G + 1, c) K, by direction."""
     model = model_with_directions(base.predictor.fast)
     names = tuple(item.name for item in model.structural)
     own = base.predictor.with_model(model, SAME_WITHIN)
-    predicted = own.predict(base.number, base.values, base.candidates, names)
+    predicted = own.at_places(base.number, base.values, base.candidates, names)
     return {name: predicted.sensitivity[:, :, column] for column, name in enumerate(names)}
 
 

@@ -1,5 +1,6 @@
 """What drawings leave open, about the machine with each set: on the lumped spindle."""
 
+import copy
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from spindle_fem.effects.catalogue.coolant_bypass import MIXED
 from spindle_fem.effects.registry import candidates_for, catalogue
 from spindle_fem.errors import ConvergenceError
-from spindle_fem.inference import search_course, tuned
+from spindle_fem.inference import search_course, structural_misdescriptions, tuned
 from spindle_fem.inference.coolant_misdescriptions import StandingCoolant
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.heat_misdescriptions import SpeedShape
@@ -18,6 +19,7 @@ from spindle_fem.inference.misdescription_columns import misdescriptions_of, wit
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
 from spindle_fem.inference.set_problems import SetProblems, combination_of
+from spindle_fem.inference.structural_misdescriptions import StructuralChange
 from spindle_fem.inference.worker_processes import Workers
 from tests.support.diagnosed_spindle import Case
 
@@ -83,6 +85,26 @@ def test_coolant_that_stood_before_the_sensor_is_read_whole_behind_a_bypass(case
     moved = predictor.predict(0, values | {names[0]: 2.0}, [bypass]).temperature[:, -1]
     plain = predictor.predict(0, values, [bypass]).temperature[:, -1]
     np.testing.assert_allclose(moved - plain, 2.0 * told[:, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize(("effect", "at", "amount"), [("sensor_gain", "SP02", 3.0), (MIXED, "", 0.9)])
+def test_what_faces_do_passes_once_through_what_a_sensor_reads(case, monkeypatch, effect, at, amount):
+    """A parameter of the machine stands for a moved face: both are derivatives of the run."""
+    lying = next(
+        c
+        for c in candidates_for(case.view)
+        if (c.effect, c.component) == (effect, at) or (effect == MIXED and c.form == MIXED)
+    )
+    own = Predictor(case.fast, [case.blank])
+    moved = copy.copy(case.fast)
+    moved.structural = [SimpleNamespace(name=own.uncertain()[0].name)]
+    monkeypatch.setattr(structural_misdescriptions, "model_with_directions", lambda fast: moved)
+    values, face = {lying.amplitude: amount}, moved.structural[0].name
+    direction = Misdescription("face", "", "", 1.0, "", StructuralChange(face))
+    about = with_misdescriptions(own, [direction], values, [lying])
+    found = about.predict(0, values, [lying], [direction.coordinate, face]).sensitivity
+    assert np.abs(found[:, :, 1]).max(axis=0).min() > 0.0
+    np.testing.assert_allclose(found[:, :, 0], found[:, :, 1], atol=1e-9)
 
 
 @pytest.mark.parametrize(
