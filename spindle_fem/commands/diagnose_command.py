@@ -151,6 +151,7 @@ def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
             )
             tell("writing")
             replace_text(place / "machine.toml", definition)
+            improved = workers.ahead(partial(improved_machine, diagnosis, opened))
             proposed = workers.ahead(partial(next_measurement, diagnosis))
             content = _write(diagnosis, opened, place, report=report)
             if report:
@@ -167,6 +168,7 @@ def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
             )
             content = with_confirmation(content)
             content["next_measurement"] = proposed()
+            replace_text(place / "improved_machine.toml", improved())
         content["wall_time_s"] = time.perf_counter() - started
         replace_text(place / "diagnosis.json", json.dumps(plain_data(content), indent=1) + "\n")
         if report:
@@ -185,14 +187,13 @@ def _draw(place: Path, content: Mapping[str, Any]) -> Mapping[str, list[Any]]:
 
 
 def _write(diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, report: bool) -> dict[str, Any]:
-    """Write predictions, states, the improved machine and the data of the report; the content so far."""
+    """Write predictions, states and the data of the report; the content so far."""
     before = predictions_at_stamps(diagnosis.unchanged, diagnosis.null)
     plant = diagnosis.predictor if diagnosis.final.candidates else diagnosis.unchanged
     after = predictions_at_stamps(plant, diagnosis.final)
     _write_predictions(diagnosis, place, "before", before)
     _write_predictions(diagnosis, place, "after", after)
     content = diagnosis_content(diagnosis, opened, before, after)
-    replace_text(place / "improved_machine.toml", improved_machine(diagnosis, opened))
     rows = states_of(content["findings"])
     if rows:
         with (place / "states.csv").open("w", newline="", encoding="utf-8") as stream:

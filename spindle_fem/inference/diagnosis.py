@@ -224,6 +224,7 @@ def diagnose_recordings(
     fitted_without(problems.plain.predictor, own)
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
     readings = FollowedReadings(problems, lambda fit: inferred_states(search, problems.of(fit), fit))
+    readings.work_out([h.fit for h in refitted], workers)
     # Where likelihoods hold, they weigh held-out readings too; on a coarse machine only their errors tell.
     kept = readings.kept(refitted) if machine.is_network else refitted
     refitted = with_own_noise(problems.plain, readings.residuals, kept)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from spindle_fem.inference.like_sets import may_stand_for
 from spindle_fem.inference.other_answers import with_other_answers
 from spindle_fem.inference.set_problems import SetProblems, combination_of
 from spindle_fem.inference.verdict import tempered
-from spindle_fem.inference.worker_processes import FitOrder, Workers
+from spindle_fem.inference.worker_processes import FitOrder, Workers, of_candidates
 
 
 def few_of_each(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -93,21 +94,26 @@ def fitted_sets(problems: SetProblems, chosen: Sequence[Hypothesis], workers: Wo
         for fit, item in zip(workers.fits([problems.of(h.fit) for h in chosen], orders), chosen, strict=True)
         if fit is not None
     ]
-    fitted = with_other_answers(
-        problems, [_begun_with_more(problems.of(h.fit), h, fitted) for h in fitted], workers
+    ends = [[more.fit.values for more in fitted if h.keys < more.keys] for h in fitted]
+    begun = workers.done(
+        [problems.of(h.fit) for h in fitted],
+        [partial(_begun_with_more, fit=h.fit, ends=own) for h, own in zip(fitted, ends, strict=True)],
     )
-    return sorted(fitted, key=lambda h: -h.score)
+    fitted = [
+        replace(h, fit=of_candidates(fit, h.fit.candidates)) for h, fit in zip(fitted, begun, strict=True)
+    ]
+    return sorted(with_other_answers(problems, fitted, workers), key=lambda h: -h.score)
 
 
-def _begun_with_more(problem: Problem, item: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis:
-    """A set fitted again from where one that holds more ended, if it begins better there.
+def _begun_with_more(problem: Problem, fit: Fit, ends: Sequence[Mapping[str, float]]) -> Fit:
+    """A set fitted again from where those that hold more ended, if it begins better there.
 
     Where a further member does nothing, the fit of the rest has ended elsewhere.
     """
-    for more in fitted:
-        if item.keys < more.keys and problem.begins_better(item.fit, more.fit.values):
-            item = replace(item, fit=problem.fit(item.fit.candidates, more.fit.values))
-    return item
+    for values in ends:
+        if problem.begins_better(fit, values):
+            fit = problem.fit(fit.candidates, values)
+    return fit
 
 
 def likelier_about(problem: Problem, fit: Fit) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from spindle_fem.inference.reading_noise import ChannelBins
 from spindle_fem.inference.set_problems import SetProblems
 from spindle_fem.inference.state_search import InferredState
 from spindle_fem.inference.unseen_moments import unread_changes, unseen_moments
+from spindle_fem.inference.worker_processes import Workers, of_candidates
 
 Array = NDArray[np.float64]
 
@@ -61,6 +63,25 @@ class FollowedReadings:
         self._known: dict[int, tuple[Fit, list[Array]]] = {}
         self._followed: dict[int, tuple[Fit, Followed]] = {}
         self._given: dict[int, tuple[Fit, GivenUp]] = {}
+        self._heldout: dict[int, tuple[Fit, float | None]] = {}
+
+    def work_out(self, fits: Sequence[Fit], workers: Workers) -> None:
+        """Know what all fits say of all readings, worked out side by side."""
+        found = workers.beside([partial(self._worked_out, fit) for fit in fits])
+        for fit, (own, predicted, heldout) in zip(fits, found, strict=True):
+            followed = Followed(fit)
+            if own is not None:
+                members = zip(fit.candidates, own.fit.candidates, strict=True)
+                same = [c if own.states.get(c.amplitude) is None else new for c, new in members]
+                followed = replace(own, fit=of_candidates(own.fit, same))
+            self._followed[id(fit)] = fit, followed
+            self._known[id(followed.fit)] = followed.fit, predicted
+            self._heldout[id(fit)] = fit, heldout
+
+    def _worked_out(self, fit: Fit) -> tuple[Followed | None, list[Array], float | None]:
+        followed = self.followed(fit)
+        moved = None if followed.fit is fit else followed
+        return moved, self._predicted(followed.fit), self.heldout_misfit(fit)
 
     def apart(self, one: Fit, other: Fit) -> float:
         """Root mean square of the difference over the noise, in the channel where it is largest."""
@@ -109,6 +130,11 @@ class FollowedReadings:
 
         With that of the calibration's readings: a fit that gives them up to tell others predicts less.
         """
+        if id(fit) not in self._heldout:
+            self._heldout[id(fit)] = fit, self._heldout_misfit(fit)
+        return self._heldout[id(fit)][1]
+
+    def _heldout_misfit(self, fit: Fit) -> float | None:
         predictor = self._problems.of(fit).predictor
         if not predictor.heldout:
             return None

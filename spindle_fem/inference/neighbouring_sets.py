@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +15,8 @@ from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import identity
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import Search, Task
+from spindle_fem.inference.missing_heat import OnOff
+from spindle_fem.inference.worker_processes import Workers, of_candidates
 
 # Kind of a candidate that only changes what a channel shows.
 SENSOR = "sensor"
@@ -144,20 +148,32 @@ def at_other_spots(
     return tasks
 
 
-def sought_again(search: Search, fit: Fit, event: Candidate) -> list[Task]:
-    """Fits from the intervals of one member in what the others leave, unless it has those already."""
+def sought_again(search: Search, sets: Sequence[tuple[Fit, Candidate]]) -> list[Task]:
+    """Fits from other intervals of one member of each set, in what its others leave."""
+    found = search.workers.beside([partial(_other_intervals, search, fit, event) for fit, event in sets])
+    tasks: list[Task] = []
+    for (fit, event), answer in zip(sets, found, strict=True):
+        if answer is not None:
+            left, intervals, candidate = answer
+            left = of_candidates(left, [c for c in fit.candidates if c is not event])
+            tasks.append(search.task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): intervals}))
+    return tasks
+
+
+def _other_intervals(search: Search, fit: Fit, event: Candidate) -> tuple[Fit, OnOff, Candidate] | None:
+    """A set without an event, and where that is on instead; None where it is on then already."""
+    alone = replace(search, workers=Workers())
     rest = tuple(c for c in fit.candidates if c is not event)
     known = search.found.get(identity(rest))
     left = search.problem.fit(rest, fit.values) if known is None else known.fit
     own = search.effects[event.effect].intervals(event, fit.values)
-    for found, candidate in search.interval_candidates(left, like=event):
+    for found, candidate in alone.interval_candidates(left, like=event):
         if candidate.form == event.form:
             instants = search.problem.predictor.drives[found.recording].grid[-1] / found.options
             same = len(own) == len(found.intervals)
-            if same and np.allclose(own, found.intervals, rtol=0.0, atol=instants):
-                return []
-            return [search.task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): found})]
-    return []
+            same = same and np.allclose(own, found.intervals, rtol=0.0, atol=instants)
+            return None if same else (left, found, candidate)
+    return None
 
 
 def _beside(search: Search, component: str) -> set[str]:

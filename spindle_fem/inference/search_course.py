@@ -112,12 +112,12 @@ def _intervals_again(search: Search) -> None:
     """Seek intervals again beside the laws that were found since: those hid when they begin."""
     best = search.ranked()[0]
     near = [h for h in search.ranked() if len(h.keys) > 1 and h.score > best.score - tuned.EXCHANGED_REACH]
-    tasks: list[Task] = []
+    sets = []
     for hypothesis in _different(search, near, signed=True)[: tuned.SETS_SOUGHT_AGAIN]:
         events = [c for c in hypothesis.fit.candidates if search.in_intervals(c)]
         if len(events) == 1:
-            tasks += sought_again(search, hypothesis.fit, events[0])
-    search.fit_all(tasks, anew=True)
+            sets.append((hypothesis.fit, events[0]))
+    search.fit_all(sought_again(search, sets), anew=True)
 
 
 def _levels_beside(search: Search) -> None:

@@ -48,6 +48,11 @@ def fit_order(problem: Problem, order: FitOrder) -> Fit | None:
     return None
 
 
+def of_candidates(fit: Fit, candidates: Sequence[Candidate]) -> Fit:
+    """A fit that came back from another process: candidates are identified by object, those are copies."""
+    return replace(fit, candidates=tuple(candidates))
+
+
 def _on_problem(problem: Shared[Problem], job: Callable[[Problem], Any]) -> Any:
     return job(problem.value)
 
@@ -73,9 +78,8 @@ class Workers:
     def fits(self, problem: Problem | Sequence[Problem], orders: Sequence[FitOrder]) -> list[Fit | None]:
         """Fits in the order given, with the candidates that were given; to one problem or each to its own."""
         fits = self.done(problem, [partial(fit_order, order=order) for order in orders])
-        # Candidates are identified by object; those that come back are copies.
         return [
-            None if fit is None else replace(fit, candidates=order.candidates)
+            None if fit is None else of_candidates(fit, order.candidates)
             for fit, order in zip(fits, orders, strict=True)
         ]
 
@@ -104,6 +108,16 @@ class Workers:
             partial(_on_problem, self._shared[id(own)], job) for job, own in zip(jobs, problems, strict=True)
         ]
         return self._pool.map(orders)
+
+    def beside(self, jobs: Sequence[Callable[[], Any]]) -> list[Any]:
+        """Result of each job, in order; in this process alone where it cannot be copied.
+
+        Parameters
+        ----------
+        jobs : sequence of callable
+            That need not be sent: methods of what only this process has.
+        """
+        return in_copies(jobs, self._number)
 
     def ahead(self, job: Callable[[], Any]) -> Callable[[], Any]:
         """Start a job in another process; the returned function waits for what it makes.

@@ -89,14 +89,14 @@ def test_intervals_are_sought_again_where_they_are_others(case, heated):
         for span in ((0.5 * (FROM + UNTIL), UNTIL), (FROM, UNTIL))
     )
     fit = problem.fit((late,), iterations=0)
-    ((members, start),) = sought_again(search, fit, late)
+    ((members, start),) = sought_again(search, [(fit, late)])
     ((began, ended),) = effect_of("unrecorded_heat_source").intervals(members[0], start)
     assert (began, ended) == (pytest.approx(FROM, abs=900.0), pytest.approx(UNTIL, abs=900.0))
     # Fitted from there although it is known, and kept because it ends better.
     search.keep(Hypothesis(fit, -1.0))
     search.fit_all([(members, start)], anew=True)
     assert search.ranked()[0].fit.misfit_with_prior < fit.misfit_with_prior
-    assert sought_again(search, problem.fit((right,)), right) == []
+    assert sought_again(search, [(problem.fit((right,)), right)]) == []
 
 
 def test_a_loss_is_extended_beside_the_heat_that_it_reads_like(case, heated):
