@@ -1,0 +1,48 @@
+"""What sets say of all readings, those that were held out included: on the lumped spindle."""
+
+import numpy as np
+import pytest
+
+from spindle_fem.effects.registry import effect_of
+from spindle_fem.inference.followed_readings import FollowedReadings
+from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.prepared_problem import EXPECTED_SLOW
+from spindle_fem.inference.set_problems import SetProblems
+from spindle_fem.inference.worker_processes import Workers
+from tests.support.diagnosed_spindle import FROM, HEAT, UNTIL, Case
+
+
+@pytest.fixture(scope="module")
+def problem_and_fits(tmp_path_factory):
+    """Fits of a heat that ends too early within the held-out readings, and of nothing missing."""
+    case = Case(tmp_path_factory.mktemp("followed"))
+    heated = case.diagnosis(("unrecorded_heat_source", "front_bearings"), HEAT, "missing_physics", ())
+    seen = heated.predictor.observations
+    problem = Problem(heated.predictor, heated.calibrated.belief, EXPECTED_SLOW, seen)
+    early = effect_of("unrecorded_heat_source").over(case.view, "front_bearings", [(FROM, 4600.0)])
+    # Enough of them that every process has some.
+    cut_short = [problem.fit((early,), {early.amplitude: HEAT}, iterations=0) for _ in range(6)]
+    return problem, [*cut_short, heated.final, problem.fit()]
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_sets_worked_out_side_by_side_say_what_each_says_alone(problem_and_fits, number):
+    problem, fits = problem_and_fits
+    problems = SetProblems(problem, problem)
+    alone, together = FollowedReadings(problems), FollowedReadings(problems)
+    together.work_out(fits, Workers(number))
+    for fit in fits:
+        assert together.heldout_misfit(fit) == pytest.approx(alone.heldout_misfit(fit), rel=1e-9)
+        assert together.beyond(fit) == pytest.approx(alone.beyond(fit), rel=1e-9)
+        for (_, one), (_, other) in zip(together.residuals(fit), alone.residuals(fit), strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-9)
+        # Whoever compares members of sets compares objects.
+        followed = together.followed(fit).fit
+        assert all(a is b for a, b in zip(followed.candidates, fit.candidates, strict=True))
+
+
+def test_a_moment_within_held_out_readings_follows_them(problem_and_fits):
+    problem, (early, *_) = problem_and_fits
+    followed = FollowedReadings(SetProblems(problem, problem)).followed(early).fit
+    ((_, ended),) = effect_of("unrecorded_heat_source").intervals(early.candidates[0], followed.values)
+    assert 4900.0 < ended <= 5000.0 < UNTIL
