@@ -96,6 +96,7 @@ class BaseRun:
         self.channels = len(self.columns) + len(self.places)
         self._coefficient: dict[str, Array] = {}
         self._told: tuple[Array, Array] | None = None
+        self._inlet: Array | None = None
 
     # ------------------------------------------------------------------ answers
     def outputs(self, tangent: Array, inlet: Array | None = None) -> Array:
@@ -256,14 +257,15 @@ class BaseRun:
             about = self.values, self.candidates
             at_places = self.predictor.at_places(self.number, *about)
             felt = self.predictor.pass_on(self.number, at_places, *about)
-            self._told = felt, at_places.temperature
+            self._told, self._inlet = (felt, at_places.temperature), at_places.inlet
         return self._told
 
     def _reading(self, variant: Variant) -> Array:
         """Difference of one channel that a sensor effect makes, (G + 1, c)."""
         values = self.values | variant.values(variant.candidate.reference)
         predicted = self.predicted()
-        return self.predictor.read(self.number, [variant.candidate], values, predicted) - predicted
+        shown = self.predictor.read(self.number, [variant.candidate], values, predicted, self._inlet)
+        return shown - predicted
 
     def _steady(self, variants: Sequence[Variant]) -> Array:
         """Constant changes of the operators, by their derivatives where they do nothing."""

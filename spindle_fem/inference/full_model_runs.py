@@ -171,9 +171,14 @@ def _run(
 
 def _readings(predictor: Predictor, number: int, fit: Fit, seen: Array) -> Array:
     """Readings of every channel in a full run, on the reduced model's grid, (G + 1, c) K or µm."""
-    predicted = predictor.read(number, predictor.effects.candidates, {}, seen)
+    acting, own = _acting(fit.candidates, number), predictor.effects.candidates
+    inlet = None
+    if any(c.reading is not None and c.reading.mixes_inlet for c in (*acting, *own)):
+        # What effects do to it follows no temperature: the reduced model knows it as the full one does.
+        inlet = predictor.at_places(number, fit.values, fit.candidates).inlet
+    predicted = predictor.read(number, own, {}, seen, inlet)
     predicted = predicted + _first_order(predictor, number, fit)
-    return predictor.read(number, _acting(fit.candidates, number), fit.values, predicted)
+    return predictor.read(number, acting, fit.values, predicted, inlet)
 
 
 def _first_order(predictor: Predictor, number: int, fit: Fit) -> Array | float:

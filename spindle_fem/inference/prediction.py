@@ -34,6 +34,10 @@ class Prediction:
         Derivatives of the states by the coordinates that enter the run; None if none were requested.
     columns : (p,) int ndarray
         Index in the tangents of each requested coordinate, -1 for none.
+    inlet : (G + 1,) ndarray or None, [K]
+        Coolant inlet with what effects do to it; None without a coolant.
+    inlet_by : (G + 1, p) ndarray or None
+        By the requested coordinates.
     """
 
     temperature: Array
@@ -42,6 +46,8 @@ class Prediction:
     run: TransientRun | None = None
     tangents: Array | None = None
     columns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    inlet: Array | None = None
+    inlet_by: Array | None = None
 
     def moved(self, move: Array) -> Prediction:
         """The run with its states moved to first order with the coordinates (p,)."""
@@ -80,15 +86,19 @@ class Prediction:
         if reading.channel not in channels:
             return
         column = channels.index(reading.channel)
+        inputs, inlet_slopes = inputs_at(drive, drive.times), None
+        if reading.mixes_inlet and self.inlet is not None:
+            inputs, inlet_slopes = dict(inputs) | {"coolant_inlet": self.inlet}, self.inlet_by
         own = {f"{reading.name}.{item.name}": item.name for item in reading.parameters}
         asked = {own[name]: position for position, name in enumerate(derivatives) if name in own}
         shown, slopes, by = reading.read_with_derivatives(
             drive.times,
             self.temperature[:, column],
             self.sensitivity[:, column],
-            inputs_at(drive, drive.times),
+            inputs,
             {inner: values[outer] for outer, inner in own.items() if outer in values},
             tuple(asked),
+            inlet_slopes,
         )
         self.temperature[:, column], self.sensitivity[:, column] = shown, slopes
         self.sensitivity[:, column, list(asked.values())] += by
@@ -112,3 +122,8 @@ def acting_in(candidates: Sequence[Candidate], number: int) -> tuple[tuple[Candi
         for name in c.parameters
     }
     return acting, idle
+
+
+def readings_of(candidates: Sequence[Candidate]) -> list[Reading]:
+    """What candidates do to sensors, in their order."""
+    return [c.reading for c in candidates if c.reading is not None]

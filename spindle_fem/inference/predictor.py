@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import Candidate, Reading
+from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import Term
 from spindle_fem.inference.coordinate_names import (
     DIRECTIONS,
@@ -28,7 +28,7 @@ from spindle_fem.inference.coordinate_names import (
 from spindle_fem.inference.drive_steps import coarse_drive, even_drive
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.observations import Observation, observe
-from spindle_fem.inference.prediction import Prediction, acting_in
+from spindle_fem.inference.prediction import Prediction, acting_in, readings_of
 from spindle_fem.inference.priors import Prior, priors_of
 from spindle_fem.inference.recording_gaps import (
     channel_changes,
@@ -274,7 +274,7 @@ class Predictor:
             )
         if self.fast.spec.initial == "ambient":
             return self.drives[number].first("ambient")
-        return float(np.mean(list(self._felt[number].first_readings().values())))
+        return float(np.mean(list(self._felt[number].firstreadings_of().values())))
 
     def _factors(
         self, number: int, values: Mapping[str, float], known: Sequence[str], readings: Sequence[str]
@@ -300,7 +300,7 @@ class Predictor:
             for term in candidate.terms
             for name, item in term.names().items()
         }
-        readings = {f"{r.name}.{item.name}" for r in _readings(candidates) for item in r.parameters}
+        readings = {f"{r.name}.{item.name}" for r in readings_of(candidates) for item in r.parameters}
         return self._factors(number, values, known, readings) | known, terms
 
     def transient(
@@ -369,7 +369,7 @@ class Predictor:
         values = {name: value for name, value in values.items() if name not in idle}
         # A reading may share a parameter with its term: a bypass that joins before the outlet's sensor.
         shared = {name for c in acting for term in c.terms for name in term.names()}
-        of_readings = {f"{r.name}.{item.name}" for r in _readings(acting) for item in r.parameters}
+        of_readings = {f"{r.name}.{item.name}" for r in readings_of(acting) for item in r.parameters}
         outside = (of_readings - shared) | idle
         inner = [None if name in outside else run_name(number, name) for name in derivatives]
         of_run = tuple(dict.fromkeys(own for own in inner if own is not None))
@@ -385,8 +385,11 @@ class Predictor:
         columns = self.columns[number]
         temperature = found.temperature[:, columns]
         sensitivity = np.zeros((*temperature.shape, len(derivatives)))
-        sensitivity[:, :, owners >= 0] = found.sensitivity[:, columns][:, :, owners[owners >= 0]]
-        predicted = Prediction(temperature, sensitivity, found.states, run, found.tangents, owners)
+        inside, inlet = owners >= 0, (found.inlet, np.zeros((len(temperature), len(derivatives))))
+        sensitivity[:, :, inside] = found.sensitivity[:, columns][:, :, owners[inside]]
+        if found.inlet_by is not None:
+            inlet[1][:, inside] = found.inlet_by[:, owners[inside]]
+        predicted = Prediction(temperature, sensitivity, found.states, run, found.tangents, owners, *inlet)
         self._displace(number, predicted, values, derivatives)
         self._unseen(number, predicted, values, derivatives)
         return predicted
@@ -402,7 +405,7 @@ class Predictor:
         """Turn temperatures of places into readings, in place; what reaches the sensors, (G + 1, c) K."""
         names, drive = self.recordings[number].temperature_names, self.drives[number]
         own = [(reading, NO_VALUES, ()) for reading in self.effects.readings]
-        own += [(reading, values, derivatives) for reading in _readings(acting_in(candidates, number)[0])]
+        own += [(reading, values, derivatives) for reading in readings_of(acting_in(candidates, number)[0])]
         known, slopes = self.directions_of(number)
         kind = {item.coordinate: item.of_sensor for item in self.misdescribed}
         # What a sensor does wrong it does to what reaches it.
@@ -479,15 +482,17 @@ class Predictor:
         return self._unread[kind, number]
 
     def read(
-        self, number: int, candidates: Sequence[Candidate], values: Mapping[str, float], temperature: Array
+        self,
+        number: int,
+        candidates: Sequence[Candidate],
+        values: Mapping[str, float],
+        temperature: Array,
+        inlet: Array | None = None,
     ) -> Array:
-        """Readings of the channels if their places have the temperatures (G + 1, c)."""
-        predicted = Prediction(temperature.copy(), np.zeros((*temperature.shape, 0)), np.zeros(0))
+        """Readings of the channels whose places have the temperatures (G + 1, c), beside an inlet."""
+        nothing = np.zeros((*temperature.shape, 0))
+        predicted = Prediction(temperature.copy(), nothing, np.zeros(0), inlet=inlet)
         names, drive = self.recordings[number].temperature_names, self.drives[number]
-        for reading in _readings(candidates):
+        for reading in readings_of(candidates):
             predicted.read(reading, names, drive, values, ())
         return predicted.temperature
-
-
-def _readings(candidates: Sequence[Candidate]) -> list[Reading]:
-    return [c.reading for c in candidates if c.reading is not None]

@@ -87,6 +87,28 @@ def test_coolant_that_stood_before_the_sensor_is_read_whole_behind_a_bypass(case
     np.testing.assert_allclose(moved - plain, 2.0 * told[:, 0], atol=1e-9)
 
 
+def test_a_bypass_mixes_in_the_inlet_as_a_chiller_leaves_it(case):
+    """What the outlet reads behind a bypass of 0.6 has 0.6 of the swing, which no recorded input has."""
+    found = {(c.effect, c.form): c for c in candidates_for(case.view)}
+    bypass, chiller = found["coolant_bypass", MIXED], found["chiller_cycling", ""]
+    before_joint = found["coolant_bypass", ""]
+    own, names = Predictor(case.fast, [case.blank]), [bypass.amplitude, chiller.amplitude]
+    swing = {chiller.amplitude: 1.5}
+    recorded, inlet = (own.at_places(0, v, [chiller]).inlet for v in ({chiller.amplitude: 0.0}, swing))
+    assert np.abs(inlet - recorded).max() == pytest.approx(1.5, rel=0.05)
+    values, alone = swing | {bypass.amplitude: 0.6}, swing | {before_joint.amplitude: 0.6}
+    told = own.predict(0, values, [bypass, chiller], names)
+    past = own.predict(0, alone, [before_joint, chiller]).temperature[:, -1]
+    np.testing.assert_allclose(told.temperature[:, -1], 0.4 * past + 0.6 * inlet, atol=1e-9)
+    for column, name in enumerate(names):
+        ends = [
+            own.predict(0, values | {name: values[name] + step}, [bypass, chiller]).temperature[:, -1]
+            for step in (1e-4, -1e-4)
+        ]
+        slope = (ends[0] - ends[1]) / 2e-4
+        np.testing.assert_allclose(told.sensitivity[:, -1, column], slope, atol=1e-4)
+
+
 @pytest.mark.parametrize(("effect", "at", "amount"), [("sensor_gain", "SP02", 3.0), (MIXED, "", 0.9)])
 def test_what_faces_do_passes_once_through_what_a_sensor_reads(case, monkeypatch, effect, at, amount):
     """A parameter of the machine stands for a moved face: both are derivatives of the run."""

@@ -39,7 +39,7 @@ class MixedOutlet(Reading):
         The name is the term's: both share one fraction.
     """
 
-    before_sensor = True
+    before_sensor = mixes_inlet = True
 
     def __init__(self, channel: str, name: str) -> None:
         self.channel, self.name, self.parameters = channel, name, (FRACTION,)

@@ -57,12 +57,16 @@ class Reading(ABC):
         Outer names of the parameters are ``<name>.<parameter>``.
     before_sensor : bool
         Whether it is what reaches the sensor that differs, which the sensor reads as any other.
+    mixes_inlet : bool
+        Whether the coolant's inlet reaches the sensor too, with what effects do to it: the input
+        ``coolant_inlet`` is that of the run then, where there is one.
     """
 
     channel: str = ""
     name: str = ""
     parameters: tuple[TermParameter, ...] = ()
     before_sensor: bool = False
+    mixes_inlet: bool = False
 
     @abstractmethod
     def read(
@@ -96,6 +100,7 @@ class Reading(ABC):
         inputs: Mapping[str, Array],
         values: Mapping[str, float],
         differentiate_by: Sequence[str] = (),
+        inlet_slopes: Array | None = None,
     ) -> tuple[Array, Array, Array]:
         """Reading of the sensor and its derivatives.
 
@@ -111,6 +116,8 @@ class Reading(ABC):
             Own parameters by inner name; nominal where absent.
         differentiate_by : sequence of str
             Own parameters to differentiate by; logarithmic ones by their logarithm.
+        inlet_slopes : (N, p) ndarray, optional
+            Derivatives of the coolant's inlet; for readings that mix it in, moment by moment.
 
         Returns
         -------
@@ -131,6 +138,10 @@ class Reading(ABC):
                 )
         found = self.read(times, series, inputs, parameters)
         by = (found[:, 1 : 1 + width] - found[:, :1]).real
+        if inlet_slopes is not None:
+            moved = dict(inputs) | {"coolant_inlet": inputs["coolant_inlet"] + 1j * COMPLEX_STEP}
+            alone = {name: values[:1] for name, values in parameters.items()}
+            by += self.read(times, series[:, :1], moved, alone).imag / COMPLEX_STEP * inlet_slopes
         return found[:, 0].real, by, found[:, 1 + width :].imag / COMPLEX_STEP
 
 

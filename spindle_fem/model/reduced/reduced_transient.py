@@ -55,6 +55,10 @@ class FastTransient:
         What the terms added just before each of them.
     tangents : (G + 1, r, p) ndarray or None
         Derivatives of the states; None if none were requested.
+    inlet : (N,) ndarray or None, [K]
+        Coolant inlet with what the terms do to it; None without a coolant.
+    inlet_by : (N, p) ndarray or None
+        Its derivatives.
     """
 
     times: Array
@@ -66,6 +70,8 @@ class FastTransient:
     states: Array
     added: Array
     tangents: Array | None = None
+    inlet: Array | None = None
+    inlet_by: Array | None = None
 
 
 def simulate_fast(
@@ -353,8 +359,9 @@ class TransientRun:
             owner = self.built.owner[drive.read_class]
         inputs = np.vstack((self.start, self.end[last:]))
         added = np.zeros((len(states), 0)) if tracks is None else tracks.added()
-        shift_by = self._shift_inlet(inputs, tracks)
+        inlet_by = self._inlet_derivatives(inputs, tracks)
         inlet = fast.inlet_column
+        moving = np.flatnonzero(inlet_by.any(axis=0))
         n_own = len(fast.load_names)
         inputs = inputs[:, :n_own]
         for number in np.unique(owner):
@@ -363,12 +370,10 @@ class TransientRun:
             if sensitivities is None:
                 continue
             by_grid[rows] = np.einsum("or,nrp->nop", operators.outputs, sensitivities[rows], optimize=True)
-            if shift_by is not None:
-                by_grid[rows] += operators.output_inputs[None, :, inlet, None] * shift_by[rows, None, :]
+            for column in moving:
+                direct = np.outer(inlet_by[rows, column], operators.output_inputs[:, inlet])
+                by_grid[rows, :, column] += direct
             for column, parameter in enumerate(self.derivatives):
-                if inlet is not None and parameter in self.start_by:
-                    slope = np.append(self.start_by[parameter][:, inlet], self.end_by[parameter][last, inlet])
-                    by_grid[rows, :, column] += np.outer(slope[rows], operators.output_inputs[:, inlet])
                 if parameter in operators.outputs_by:
                     by_grid[rows, :, column] += states[rows] @ operators.outputs_by[parameter].T
                     by_grid[rows, :, column] += inputs[rows] @ operators.output_inputs_by[parameter].T
@@ -385,16 +390,25 @@ class TransientRun:
             states,
             added,
             sensitivities,
+            None if inlet is None else _at(drive.times, drive.grid, inputs[:, inlet]),
+            None if inlet is None else _at(drive.times, drive.grid, inlet_by),
         )
 
-    def _shift_inlet(self, inputs: Array, tracks: Tracks | None) -> Array | None:
-        """Add the terms' shift of the inlet temperature in place; its derivatives (G + 1, p)."""
-        if tracks is None or not self.dynamic.inlet_columns():
-            return None
-        shift = self.dynamic.inlet_columns()
-        values = np.vstack((tracks.added_start, tracks.added_end[-1:]))
-        inputs[:, self.fast.load_names.index("coolant_inlet")] += values[:, shift].sum(axis=1)
-        return np.concatenate((tracks.start_by, tracks.end_by[-1:]))[:, shift].sum(axis=1)
+    def _inlet_derivatives(self, inputs: Array, tracks: Tracks | None) -> Array:
+        """Derivatives of the inlet temperature (G + 1, p), after adding what terms do to it in place."""
+        found, inlet = np.zeros((len(inputs), len(self.derivatives))), self.fast.inlet_column
+        if inlet is None:
+            return found
+        for column, parameter in enumerate(self.derivatives):
+            if parameter in self.start_by:
+                found[:-1, column] = self.start_by[parameter][:, inlet]
+                found[-1, column] = self.end_by[parameter][-1, inlet]
+        if tracks is not None and self.dynamic.inlet_columns():
+            shift = self.dynamic.inlet_columns()
+            values = np.vstack((tracks.added_start, tracks.added_end[-1:]))
+            inputs[:, inlet] += values[:, shift].sum(axis=1)
+            found += np.concatenate((tracks.start_by, tracks.end_by[-1:]))[:, shift].sum(axis=1)
+        return found
 
 
 def _stepped(drive: Drive) -> Array:
