@@ -97,6 +97,16 @@ def exchanged(search: Search) -> None:
                         or (is_spindle and member.kind == SENSOR != c.kind)
                     ),
                 )
+                if is_spindle and member.kind == SENSOR:
+                    # Physics near it may crowd out what else its sensor may do wrong.
+                    tasks += _with_laws(
+                        search,
+                        rest,
+                        lambda c, member=member: (
+                            (c.kind, c.component) == (SENSOR, member.component) and c.effect != member.effect
+                        ),
+                        len(search.candidates),
+                    )
                 if is_spindle and rest and not any(search.in_intervals(c) for c in rest):
                     tasks += at_other_spots(search, hypothesis.fit, member, rest, of_each=1)
     explained = search.is_explained(search.ranked()[0])
@@ -104,7 +114,10 @@ def exchanged(search: Search) -> None:
 
 
 def _with_laws(
-    search: Search, rest: tuple[Candidate, ...], allowed: Callable[[Candidate], bool]
+    search: Search,
+    rest: tuple[Candidate, ...],
+    allowed: Callable[[Candidate], bool],
+    number: int = tuned.EFFECTS_EXCHANGED,
 ) -> list[Task]:
     """Fits with the best of the candidates allowed, no intervals among them, beside a set."""
     base = search.found.get(identity(rest))
@@ -113,7 +126,7 @@ def _with_laws(
     if identity(rest) not in search.screenings:
         search.screened(base.fit, only_laws=True)
     screened = search.screenings[identity(rest)]
-    found = screened.best_of(lambda c: allowed(c) and not search.in_intervals(c), tuned.EFFECTS_EXCHANGED)
+    found = screened.best_of(lambda c: allowed(c) and not search.in_intervals(c), number)
     gains, least = screened.singles(), -np.inf
     if search.is_explained(base):
         # What is still to be found is small, and first order says how much it gains.
