@@ -9,7 +9,7 @@ from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, i
 from spindle_fem.inference import search_course, tuned
 from spindle_fem.inference.final_fits import few_of_each
 from spindle_fem.inference.findings import findings_of
-from spindle_fem.inference.hypothesis import Hypothesis, Ranked
+from spindle_fem.inference.hypothesis import Hypothesis, Ranked, identity
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.neighbouring_sets import at_other_spots, exchanged, sought_again
@@ -66,6 +66,21 @@ def test_heat_in_intervals_is_tried_in_the_place_of_a_law_beside_others(case, he
     found = next(h for h in search.found.values() if h.keys == {SEAT, heat})
     both = next(h for h in search.found.values() if h.fit.candidates == (seat, preload))
     assert found.fit.misfit_with_prior < both.fit.misfit_with_prior
+
+
+def test_all_that_a_lying_sensor_may_do_is_tried_in_the_place_of_what_was_found(case, heated):
+    """Heat in front makes physics near the sensor promise more than what else the sensor may do."""
+    search = search_over(case, heated)
+    search.found = {}
+    late = next(c for c in search.candidates if (c.effect, c.component) == ("clock_shift", "SP02"))
+    for candidates in ((), (late,)):
+        search.keep(Hypothesis(search.problem.fit(candidates), -1e3 * (not candidates)))
+    exchanged(search)
+    tried = {identity(h.fit.candidates) for h in search.found.values()}
+    lies = [c for c in search.candidates if c.component == "SP02" and c.kind == "sensor"]
+    own = {identity((c,)) for c in lies if c is not late}
+    assert len(own) > tuned.EFFECTS_EXCHANGED
+    assert own <= tried
 
 
 def test_places_of_one_combination_hide_no_other():
