@@ -274,7 +274,7 @@ class Predictor:
             )
         if self.fast.spec.initial == "ambient":
             return self.drives[number].first("ambient")
-        return float(np.mean(list(self._felt[number].firstreadings_of().values())))
+        return float(np.mean(list(self._felt[number].first_readings().values())))
 
     def _factors(
         self, number: int, values: Mapping[str, float], known: Sequence[str], readings: Sequence[str]
