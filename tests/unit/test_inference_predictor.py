@@ -134,6 +134,13 @@ def test_machine_parameters_and_places_of_probes(predictor, candidates):
     require_derivatives(predictor, {**values, **moved}, [preload], shifts)
 
 
+def test_a_spindle_begins_at_the_ambient_or_at_its_first_readings(predictor, recording):
+    assert predictor.start(0) == pytest.approx(293.15, abs=0.01)
+    warm = replace(recording, temperature=recording.temperature + np.linspace(4.0, 6.0, len(PROBES)))
+    spec = load_machine("recorded_spindle", ['initial="first_reading"'])
+    assert Predictor(fast_spindle(lumped_model(spec), spec), [warm]).start(0) == pytest.approx(298.15)
+
+
 def test_a_displaced_probe_reads_the_gradient(predictor):
     run = predictor.transient(0, {}, ())
     states, _ = run.march(predictor.start(0))
