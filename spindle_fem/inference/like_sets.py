@@ -103,6 +103,15 @@ def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
     return sorted(found, key=lambda item: -item.probability)
 
 
+def likeliest_first(ranked: Sequence[Ranked], overlapping: Mapping[str, frozenset[str]]) -> list[Ranked]:
+    """Sets, the first of those in front that together, as :func:`as_one` has it, are the most probable."""
+    first, others = as_one(ranked, overlapping)
+    best = max([first, *others], key=lambda item: item.probability)
+    # The first of a group stands for it, with its own fit.
+    front = next(item for item in ranked if item.fit is best.fit)
+    return [front, *(item for item in ranked if item is not front)]
+
+
 def as_one(
     ranked: Sequence[Ranked], overlapping: Mapping[str, frozenset[str]]
 ) -> tuple[Ranked, list[Ranked]]:

@@ -20,6 +20,7 @@ from spindle_fem.inference.like_sets import (
     free_in_time,
     holds,
     leaves_unnamed,
+    likeliest_first,
     may_stand_for,
     with_needed_thirds,
 )
@@ -243,6 +244,7 @@ def judge(
         ranked = _without(ranked, empty)
     if coarseness == 1.0:
         ranked = with_needed_thirds(ranked)
+    ranked = likeliest_first(ranked, overlapping or {})
     chosen = ranked[0]
     if tuned.RULED_OUT <= p_value <= tuned.SIGNIFICANT:
         nothing = min(empty.probability, tuned.STILL_POSSIBLE)

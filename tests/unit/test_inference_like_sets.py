@@ -52,6 +52,22 @@ def test_a_verdict_doubts_thirds_of_a_machine_that_is_drawn():
         assert len(found.chosen.fit.keys) == members
 
 
+def test_what_is_likelier_at_places_that_count_as_one_is_named_first():
+    """Split between a bearing and its set it is behind another effect, together ahead of it."""
+    group = dict.fromkeys(("front_bearings", "F1"), frozenset({"F1", "front_bearings"}))
+    found = [
+        hypothesis(misfit=1400.0),
+        hypothesis(PRELOAD, misfit=400.0),
+        hypothesis(replace(CHURNING, component="F1"), misfit=400.6),
+        hypothesis(CHURNING, misfit=400.5),
+    ]
+    apart, together = verdict(*found), verdict(*found, overlapping=group)
+    assert [c.effect for c in apart.chosen.fit.candidates] == [PRELOAD.effect]
+    assert together.chosen.fit is found[3].fit
+    assert [i.fit for i in together.alternatives] == [found[1].fit]
+    assert together.chosen.probability > together.alternatives[0].probability
+
+
 def test_a_rival_is_one_by_what_fitted_readings_say_of_it():
     nothing, best = replace(hypothesis(misfit=1400.0), heldout=900.0), hypothesis(PRELOAD, misfit=400.0)
     best = replace(best, heldout=500.0)
