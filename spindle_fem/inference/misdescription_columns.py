@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coolant_misdescriptions import coolant_misdescriptions
 from spindle_fem.inference.coordinate_names import NO_VALUES
@@ -22,6 +23,7 @@ from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.mounting_misdescriptions import mounting_misdescriptions
 from spindle_fem.inference.network_misdescriptions import network_misdescriptions
+from spindle_fem.inference.prediction import acting_in
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.structural_misdescriptions import structural_misdescriptions
 
@@ -67,10 +69,19 @@ def columns_about(
     values: Mapping[str, float],
     candidates: Sequence[Candidate],
 ) -> dict[tuple[int, str], Array]:
-    """What directions do about runs with the given values, as :meth:`Predictor.misdescribed_by` takes it."""
+    """What directions do about runs with the given values, as :meth:`Predictor.misdescribed_by` takes it.
+
+    A delay of a channel does nothing where a candidate gives it one: to first order both are the same, and
+    where they are not, readings would tell apart two delays that nobody can.
+    """
     columns = {}
     for number in range(len(predictor.recordings)):
-        acting = [item for item in directions if item.recording in (None, number)]
+        late = {
+            c.reading.channel
+            for c in acting_in(candidates, number)[0]
+            if c.reading and effect_of(c.effect).delays
+        }
+        acting = [i for i in directions if i.recording in (None, number) and i.delays not in late]
         if acting:
             found, _ = direction_columns(BaseRun(predictor, number, values, candidates), acting)
             columns |= {(number, item.coordinate): found[:, :, i] for i, item in enumerate(acting)}

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.misdescription_columns import columns_about
 from spindle_fem.inference.worker_processes import Workers
@@ -67,8 +68,15 @@ class SetProblems:
 
 
 def combination_of(fit: Fit) -> tuple[str, ...]:
-    """Effects of a set, wherever they are and whatever their forms: directions do much the same then."""
-    return tuple(sorted(candidate.effect for candidate in fit.candidates))
+    """Effects of a set, wherever they are and whatever their forms: directions do much the same then.
+
+    With the channel of those that make one late, as its own delay does nothing beside them.
+    """
+    return tuple(
+        sorted(
+            f"{c.effect}@{c.component}" if effect_of(c.effect).delays else c.effect for c in fit.candidates
+        )
+    )
 
 
 def _columns(

@@ -87,6 +87,20 @@ def test_coolant_that_stood_before_the_sensor_is_read_whole_behind_a_bypass(case
     np.testing.assert_allclose(moved - plain, 2.0 * told[:, 0], atol=1e-9)
 
 
+def test_a_channel_has_one_delay_only(case, problem):
+    """Beside a clock that is off its sensor's own delay does nothing; those of other sensors do."""
+    responses = [d for d in misdescriptions_of(problem.predictor) if d.delays in ("SP01", "SP02")]
+    late = {place: case.candidates["clock_shift", place] for place in ("SP01", "SP02")}
+    assert len(responses) == 2
+    plain = with_misdescriptions(problem.predictor, responses)
+    assert all(plain.column_of(0, d.coordinate) is not None for d in responses)
+    values = {late["SP02"].amplitude: 60.0}
+    about = with_misdescriptions(problem.predictor, responses, values, [late["SP02"]])
+    assert {d.delays for d in responses if about.column_of(0, d.coordinate) is None} == {"SP02"}
+    fits = [problem.fit([one], {one.amplitude: 60.0}, iterations=0) for one in late.values()]
+    assert combination_of(fits[0]) != combination_of(fits[1])
+
+
 def test_a_bypass_mixes_in_the_inlet_as_a_chiller_leaves_it(case):
     """What the outlet reads behind a bypass of 0.6 has 0.6 of the swing, which no recorded input has."""
     found = {(c.effect, c.form): c for c in candidates_for(case.view)}
