@@ -249,7 +249,7 @@ class BaseRun:
         return self._passed_on()[1]
 
     def before_sensors(self) -> Array:
-        """What reaches the sensors, (G + 1, c) K, before what they do wrong."""
+        """What the sensors feel, late as they are, (G + 1, c) K, before what they do wrong."""
         return self._passed_on()[0]
 
     def _passed_on(self) -> tuple[Array, Array]:

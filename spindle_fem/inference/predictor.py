@@ -402,7 +402,7 @@ class Predictor:
         candidates: Sequence[Candidate] = (),
         derivatives: Sequence[str] = (),
     ) -> Array:
-        """Turn temperatures of places into readings, in place; what reaches the sensors, (G + 1, c) K."""
+        """Turn temperatures of places into readings, in place; what sensors feel, delayed, (G + 1, c) K."""
         names, drive = self.recordings[number].temperature_names, self.drives[number]
         own = [(reading, NO_VALUES, ()) for reading in self.effects.readings]
         own += [(reading, values, derivatives) for reading in readings_of(acting_in(candidates, number)[0])]
@@ -410,9 +410,9 @@ class Predictor:
         kind = {item.coordinate: item.of_sensor for item in self.misdescribed}
         # What a sensor does wrong it does to what reaches it.
         for of_sensor in (False, True):
-            felt = predicted.temperature.copy()
             acting = [name if kind[name] is of_sensor else "" for name in known]
             predicted.add(acting, slopes, values, derivatives)
+            felt = predicted.temperature.copy()
             for reading, *told in own:
                 if reading.before_sensor is not of_sensor:
                     predicted.read(reading, names, drive, *told)
