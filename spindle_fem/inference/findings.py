@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.effect import Candidate, Reported, in_intervals, place_words
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import effect_of
+from spindle_fem.inference import tuned
 from spindle_fem.inference.calibration import LEVEL
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
@@ -59,6 +60,11 @@ def reported_parameters(fit: Fit, candidate: Candidate, seed: int = 0) -> dict[s
         if name in samples:
             spread = np.exp(sigma * generator.standard_normal(DRAWS))
             samples[name] = (np.array(samples[name]) * spread).tolist()
+    if effect.delays:
+        # What the sensor answers late by itself is in it, and what is never negative is not stated so.
+        name = candidate.amplitude.rpartition(".")[2]
+        moved = np.array(samples[name]) + tuned.RESPONSE_SIGMA * generator.standard_normal(DRAWS)
+        samples[name] = np.maximum(moved, min(candidate.parameters[candidate.amplitude].low, 0.0)).tolist()
     for name, sigma in effect.law_shift.items():
         if name in samples:
             moved = np.array(samples[name]) + sigma * generator.standard_normal(DRAWS)

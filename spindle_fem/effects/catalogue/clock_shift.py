@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,9 +46,6 @@ class ClockShift(SensorEffect):
         acts_on="every sensor",
         states={"shift": "s"},
     )
-
-    # Sensors answer some seconds later or earlier than they are described.
-    law_shift = MappingProxyType({"shift": 10.0})
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
         """The shift, in s."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,9 +52,6 @@ class SensorLag(SensorEffect):
         acts_on="every sensor",
         states={"time_constant": "s"},
     )
-
-    # Sensors answer some seconds later or earlier than they are described.
-    law_shift = MappingProxyType({"time_constant": 10.0})
 
     def of_forms(self, machine: MachineView) -> dict[str, Form]:
         """The time constant, in s."""
