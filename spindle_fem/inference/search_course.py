@@ -142,8 +142,7 @@ def _beside(search: Search) -> None:
             return
         search.progress("diagnosis: beside the best set")
         if not any(search.is_hidden_state(c) for c in best.fit.candidates):
-            laws = [h.fit for h in search.ranked() if _only_laws(search, h)]
-            _what_changes(search, laws[0])
+            _what_changes(search, laws_with_room(search))
         else:
             add_states(search, best.fit, 1)
         screened, intervals = search.screened(best.fit)
@@ -241,6 +240,12 @@ def _combination(search: Search, hypothesis: Hypothesis, signed: bool = False) -
             for c in hypothesis.fit.candidates
         )
     )
+
+
+def laws_with_room(search: Search) -> Fit:
+    """The best set that follows laws alone and may hold one effect more."""
+    ranked = search.ranked()
+    return next(h.fit for h in ranked if _only_laws(search, h) and len(h.fit.candidates) < LARGEST_SET)
 
 
 def _only_laws(search: Search, hypothesis: Hypothesis) -> bool:

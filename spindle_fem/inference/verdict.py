@@ -317,16 +317,19 @@ def judge(
     # What every likely set holds is sure, whether there is more or not.
     common = sum(item.probability for item in ranked if holds(item.fit, chosen.fit, known_as_one))
     several = common * (1.0 - nothing) < tuned.DECIDED or bool(near)
-    decided = not several and known * evidence >= tuned.LIKELIER_RIGHT
+    doubted = known * evidence < tuned.LIKELIER_RIGHT
+    kind = kind_of(chosen.fit.candidates)
+    # What is likelier than a doubted set is something else that is missing, or a law unlike those known.
+    decided = not several and (kind == "missing_physics" or not doubted)
     if decided:
-        reason = ""
+        reason = DOUBTED_REASON if doubted else ""
     elif nothing > 1.0 - tuned.DECIDED:
         reason = NOTHING_REASON
     elif several:
         reason = NEAR_REASON if near else SEVERAL_REASON
     else:
         reason = DOUBTED_REASON
-    verdict: Verdict = kind_of(chosen.fit.candidates) if decided else "ambiguous"
+    verdict: Verdict = kind if decided else "ambiguous"
     if rest > tuned.MOST_LEFT:
         before = left(empty.fit)
         verdict = "unexplained"

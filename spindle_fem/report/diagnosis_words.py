@@ -70,8 +70,9 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         )
     statements = " ".join(item["statement"] for item in content["findings"])
     lead = "" if verdict == "sensor" else _heat_words(content)
-    probability = content.get("set_probability")
-    return f"{lead}{statements} Probability {chance(probability)}. {_improvement(fit)}"
+    doubt = str(content.get("reason") or "").rstrip(".")
+    sure = f"Probability {chance(content.get('set_probability'))}.{f' {capital(doubt)}.' if doubt else ''}"
+    return f"{lead}{statements} {sure} {_improvement(fit)}"
 
 
 def sensors_named(content: Mapping[str, Any]) -> list[str]:

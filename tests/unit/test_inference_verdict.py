@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.inference import tuned
-from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
+from spindle_fem.inference.reliability import reliable
 from spindle_fem.inference.verdict import (
     CONTRADICTED_REASON,
     NEAR_REASON,
@@ -456,38 +456,3 @@ def test_physics_is_never_within_a_prior():
     both = hypothesis(SCALE, PRELOAD, misfit=400.0)
     assert not within_prior(both.fit, calibrated=False)
     assert not within_prior(hypothesis(misfit=400.0).fit, calibrated=False)
-
-
-# ------------------------------------------------------------------- reliability
-def test_a_small_last_effect_makes_a_set_less_reliable():
-    null, one = hypothesis(misfit=4400.0), hypothesis(PRELOAD, misfit=600.0)
-    other = hypothesis(candidate("windage", "shaft"), misfit=3000.0)
-    pair = hypothesis(PRELOAD, OFFSET, misfit=400.0)
-    assert share_of_last([null, one, other, pair], pair) == pytest.approx(200.0 / 4000.0)
-    assert share_of_last([null, one, other, pair], one) == 1.0
-    # Nothing smaller was fitted but nothing itself: all of the gain is the set's.
-    assert share_of_last([null, pair], pair) == 1.0
-    assert gain_of_more([null, one, other, pair], one) == pytest.approx(
-        0.5 * (one.fit.misfit_with_prior - pair.fit.misfit_with_prior)
-    )
-    assert gain_of_more([null, one, other, pair], pair) == 0.0
-    assert reliable(0.999, 1.0, more=50.0) < reliable(0.999, 1.0)
-    assert reliable(0.999, 0.05) < reliable(0.999, 0.5) < reliable(0.999, 1.0) < 0.999
-
-
-@pytest.mark.parametrize("probability", [0.02, 0.3, 0.6, 0.9, 0.99, 1.0])
-def test_experience_only_lowers_what_evidence_says(probability):
-    found = [reliable(probability, share) for share in (0.0, 0.1, 1.0)]
-    assert all(0.0 < value <= probability for value in found)
-
-
-def test_what_experience_takes_goes_to_something_else():
-    found = verdict(
-        hypothesis(misfit=1400.0),
-        hypothesis(PRELOAD, misfit=400.0),
-        hypothesis(candidate("windage", "shaft"), misfit=404.0),
-        calibrated=True,
-    )
-    stated = [found.chosen.probability, *(item.probability for item in found.alternatives), found.other]
-    assert sum(stated) == pytest.approx(1.0)
-    assert found.chosen.probability == pytest.approx(reliable(found.evidence, 1.0))

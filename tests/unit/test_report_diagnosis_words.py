@@ -56,6 +56,8 @@ def test_findings_of_a_verdict_without_explanation_are_no_statements(verdict, ca
     table = set_tables(told)[0]
     assert table.caption == ("What comes nearest." if unexplained else "What was found.")
     assert any("comes nearest" in item["name"] for item in cards(told).items) == unexplained
+    told["reason"] = "something else is likelier than the best set"
+    assert unexplained or "Probability 0.34. Something else is likelier" in verdict_sentence(told)
     print_diagnosis(told, Path())
     assert ("Comes nearest: 312 W" in capsys.readouterr().out) == unexplained
 

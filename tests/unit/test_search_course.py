@@ -47,6 +47,17 @@ def test_a_state_that_gains_a_little_every_time_is_not_followed_for_ever(monkeyp
     assert search.rounds == rounds
 
 
+def test_what_changes_is_sought_beside_the_best_laws_that_leave_room_for_it():
+    def found(*names):
+        return SimpleNamespace(fit=SimpleNamespace(candidates=names))
+
+    three, with_state, two, one = found("a", "b", "c"), found("a", "state"), found("a", "b"), found("a")
+    search = SimpleNamespace(
+        ranked=lambda: [three, with_state, two, one], in_intervals=lambda item: item == "state"
+    )
+    assert search_course.laws_with_room(search) is two.fit
+
+
 @pytest.mark.parametrize(
     ("explained", "members", "size", "is_network", "beam"),
     [
