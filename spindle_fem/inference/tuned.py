@@ -197,8 +197,8 @@ LEAST_IMPROVEMENT, LEAST_IMPROVEMENT_DRAWN = 0.03, 0.01
 # Likewise of a set with events, from which on laws that leave little are not enough. (Consistent networks of
 # seeds 66 and 101: at most 0.17 in 21; states that had been missed there: 0.39 and 0.47.)
 IMPROVEMENT_OF_EVENTS = 0.25
-# Probability by evidence from which the first set alone is named, and that which is stated at least where it
-# holds parameters or sensors only.
+# Probability by evidence from which the first set alone is named, and that which is stated at least then, or,
+# where it holds physics, would be without experience of how often sets like it are right.
 DECIDED, LIKELIER_RIGHT = 0.75, 0.5
 # Sets of as many effects are named together where their readings differ by less than this share of the noise
 # in every channel (root mean square), all readings are less than LEAST_HELDOUT_GAIN for the first, and

@@ -308,7 +308,8 @@ def judge(
     evidence = alike.probability
     share = share_of_last(hypotheses, chosen.best)
     more = gain_of_more(hypotheses, chosen.best)
-    known = (1.0 - nothing) * (1.0 - inexact) * reliable(evidence, share, more) / evidence
+    exact = (1.0 - nothing) * (1.0 - inexact)
+    known = exact * reliable(evidence, share, more) / evidence
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
         for item in rivals
@@ -319,8 +320,9 @@ def judge(
     several = common * (1.0 - nothing) < tuned.DECIDED or bool(near)
     doubted = known * evidence < tuned.LIKELIER_RIGHT
     kind = kind_of(chosen.fit.candidates)
-    # What is likelier than a doubted set is something else that is missing, or a law unlike those known.
-    decided = not several and (kind == "missing_physics" or not doubted)
+    # Where little is left, what is likelier than a doubted set is other physics, or a law unlike those known.
+    is_physics = kind == "missing_physics" and exact >= tuned.LIKELIER_RIGHT
+    decided = not several and (is_physics or not doubted)
     if decided:
         reason = DOUBTED_REASON if doubted else ""
     elif nothing > 1.0 - tuned.DECIDED:
