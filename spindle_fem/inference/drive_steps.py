@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 DIAGNOSED = ClassWidths(3.0, 0.01, 0.01, 120)
 # Oil temperatures of classes are rounded to this, K: classes of one temperature share the channel's maps.
 INLET_STEP = 0.5
+# After a change of the inputs what follows at once, balls, rings and films, takes minutes: steps of a minute
+# leave up to 0.25 K there (recorded spindle, started and stopped every quarter of an hour), these 0.02 K.
+SETTLING, SHORT_STEP = 240.0, 20.0
 
 
 def _centred(fine: Drive, recording: Recording) -> Drive:
@@ -44,18 +47,14 @@ def _centred(fine: Drive, recording: Recording) -> Drive:
 
 
 def coarse_drive(spec, recording: Recording, step: float) -> Drive:
-    """Inputs on steps from change to change, none longer than ``step``; outputs at their ends."""
+    """Inputs on steps from change to change, none longer than ``step``, short about changes."""
     fine = _centred(drive_of_recording(spec, recording), recording)
     begin, finish = fine.grid[0], fine.grid[-1]
     beside = covariate_columns(fine.names)
     inputs = np.setdiff1d(np.arange(len(fine.names)), beside)
     jumps = fine.grid[1:-1][np.any(fine.start[1:, inputs] != fine.end[:-1, inputs], axis=1)]
     edges = np.unique(np.concatenate(([begin], jumps, [finish])))
-    # Stamps a second apart that all jump (an input that flickers) would only cost.
-    pieces = [
-        np.linspace(a, b, max(1, int(np.ceil((b - a) / step - 1e-6))) + 1)[:-1]
-        for a, b in itertools.pairwise(edges)
-    ]
+    pieces = [_steps_between(a, b, step) for a, b in itertools.pairwise(edges)]
     grid = np.append(np.concatenate(pieces), finish)
     middle = 0.5 * (grid[:-1] + grid[1:])
     start, end = np.empty((middle.size, len(fine.names))), np.empty((middle.size, len(fine.names)))
@@ -74,6 +73,25 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
         replace(p, coolant_inlet_temperature=inlet) for p, inlet in zip(points, shared, strict=True)
     )
     return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
+
+
+def _steps_between(begin: float, end: float, step: float) -> Array:
+    """Starts of the steps from one change to the next.
+
+    Stamps a second apart that all jump (an input that flickers) would only cost: no step is cut below them.
+    """
+    short = min(SHORT_STEP, step)
+    settled, before = begin + SETTLING, end - short
+    spans = [(begin, end, short)]
+    if settled + short < before:
+        # The last one is short as well: what changed between two rows may have changed before the later one.
+        spans = [(begin, settled, short), (settled, before, step), (before, end, short)]
+    return np.concatenate(
+        [
+            np.linspace(a, b, max(1, int(np.ceil((b - a) / longest - 1e-6))) + 1)[:-1]
+            for a, b, longest in spans
+        ]
+    )
 
 
 def _means(fine: Drive, grid: Array) -> Array:

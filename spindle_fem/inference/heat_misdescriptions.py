@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.filters import delayed, first_order_lag
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.misdescription import Change, Misdescription
@@ -112,8 +113,10 @@ def _more(base: BaseRun, coefficients: Sequence[str], start: Array | float, end:
 
 
 def clock_change(base: BaseRun) -> Change:
-    """Temperatures stamped a second later than the inputs: readings are those of a second before."""
-    return Change(direct=-np.gradient(base.before_sensors(), base.drive.grid, axis=0))
+    """Temperatures stamped later than the inputs, per second: the secant over the usual shift both ways."""
+    grid, felt, shift = base.drive.grid, base.before_sensors(), tuned.CLOCK_SIGMA
+    later, earlier = (delayed(grid, felt, np.full(felt.shape[1], way * shift)).real for way in (1.0, -1.0))
+    return Change(direct=(later - earlier) / (2.0 * shift))
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,13 +126,14 @@ class Response:
     channel: str
 
     def __call__(self, base: BaseRun) -> Change:
-        """To first order a delay and a lag are the same."""
+        """What a lag of the usual size changes, per second of it."""
         names = base.predictor.recordings[base.number].temperature_names
         felt = base.before_sensors()
         late = np.zeros_like(felt)
         if self.channel in names:
-            column = names.index(self.channel)
-            late[:, column] = -np.gradient(felt[:, column], base.drive.grid)
+            column, lag = names.index(self.channel), np.array([tuned.RESPONSE_SIGMA])
+            own = felt[:, column, None]
+            late[:, column] = (first_order_lag(base.drive.grid, own, lag).real - own)[:, 0] / lag
         return Change(direct=late)
 
 

@@ -11,7 +11,7 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.registry import candidates_for, effect_of, interval_effects
 from spindle_fem.inference.candidate_response import BaseRun, Variant, variants_of
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, PROBE_PREFIX
-from spindle_fem.inference.drive_steps import coarse_drive
+from spindle_fem.inference.drive_steps import SETTLING, SHORT_STEP, coarse_drive
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, known_before, start_coordinates
@@ -263,6 +263,11 @@ def test_steps_end_where_inputs_jump_and_keep_their_course(predictor, recording)
     jumps = fine.grid[1:-1][fine.start[1:, 0] != fine.end[:-1, 0]]
     assert jumps.size == 3
     assert np.isin(jumps, drive.grid).all()
+    # Short where balls and films settle, and in the last step before a change.
+    since = drive.grid[:-1] - np.append(0.0, jumps)[np.searchsorted(jumps, drive.grid[:-1], side="right")]
+    assert drive.steps[since < SETTLING - 1e-6].max() <= SHORT_STEP + 1e-6
+    assert drive.steps[np.searchsorted(drive.grid, jumps) - 1].max() <= SHORT_STEP + 1e-6
+    assert drive.steps.max() > 2.0 * SHORT_STEP
 
 
 def test_covariates_are_means_over_the_steps_and_end_none(predictor, recording):
@@ -379,13 +384,13 @@ def test_changes_between_rows_that_were_held_out_are_told_by_all_readings(predic
     use = (recording.times < 2400.0) | (recording.times > 2900.0)
     blank = Predictor(predictor.fast, [recording], [use], step=60.0)
     name = blank.jumps()[1][0]
-    truth = blank.predict(0, {name: 2.0}).temperature
+    truth = blank.predict(0, {name: 30.0}).temperature
     at_rows = interp1d(blank.drives[0].grid, truth, axis=0)(recording.times)
     own = Predictor(predictor.fast, [replace(recording, temperature=at_rows)], [use], step=60.0)
     fit = Problem(own, known_before(own), EXPECTED_SLOW, own.observations).fit()
     # What comes after the stretch tells less than what is in it.
-    missed, told = abs(fit.values[name] - 2.0), abs(unread_changes(own, fit)[name] - 2.0)
-    assert told < 2.5 < 6.0 < missed
+    missed, told = abs(fit.values[name] - 30.0), abs(unread_changes(own, fit)[name] - 30.0)
+    assert told < 1.0 < 3.0 < missed
 
 
 def test_the_small_basis_reads_what_the_large_one_does(predictor, candidates):
