@@ -29,33 +29,23 @@ class Observation:
         Column of the recording.
     values : (b,) ndarray, [K]
         Mean reading of each bin.
-    right : (b,) int ndarray or None
-        Point of the prediction's grid after each bin's mean time; None where
-        it has a value at every stamp of the recording, which are averaged.
-    part : (b,) ndarray or None
-        Share of the step before it that has passed.
-    spread : (b, G + 1) csr_array or None
-        Averages over the rows of each bin, where a bin is long beside what the temperatures do.
+    means : (b, G + 1) csr_array or None
+        Averages over the rows of each bin of what is linear between points of the prediction's grid; None
+        where that has a value at every stamp of the recording.
     """
 
     recording: int
     channel: int
     bins: ChannelBins
     values: Array
-    right: NDArray[np.int64] | None = None
-    part: Array | None = None
-    spread: csr_array | None = None
+    means: csr_array | None = None
 
     def at(self, predicted: Array) -> Array:
         """Values at the bins, (b, ...), from values (G + 1, ...) on the grid or (N, ...) at the stamps."""
-        if self.spread is not None:
-            flat = self.spread @ predicted.reshape(len(predicted), int(np.prod(predicted.shape[1:])))
-            return flat.reshape(len(flat), *predicted.shape[1:])
-        if self.right is None:
+        if self.means is None:
             return self.bins.average(predicted)
-        part = self.part.reshape(-1, *([1] * (predicted.ndim - 1)))
-        left = predicted[self.right - 1]
-        return left + part * (predicted[self.right] - left)
+        flat = self.means @ predicted.reshape(len(predicted), int(np.prod(predicted.shape[1:])))
+        return flat.reshape(len(flat), *predicted.shape[1:])
 
 
 def observe(
@@ -76,22 +66,20 @@ def observe(
     widths : sequence of float or None, [s]
         Width of the bins of each recording, as :func:`channel_bins` takes it.
     rows : sequence of float, optional, [s]
-        Time over which each row of a recording is a mean; predictions are averaged as the readings were.
-        Otherwise the prediction at a bin's mean time is used.
+        Time over which each row of a recording is a mean: predictions are averaged as the readings were.
+        Otherwise rows are of their moment.
     """
     found = []
     for number, (recording, mask, grid, width) in enumerate(zip(recordings, use, grids, widths, strict=True)):
         for bins in channel_bins(recording, mask, width=width):
             values = bins.average(recording.temperature[:, bins.channel])
-            weights = () if grid is None else grid_weights(bins.times, grid)
-            spread = (
-                None if grid is None or rows is None else _spread(bins, recording.times, grid, rows[number])
-            )
-            found.append(Observation(number, bins.channel, bins, values, *weights, spread))
+            row = 0.0 if rows is None else rows[number]
+            means = None if grid is None else _means(bins, recording.times, grid, row)
+            found.append(Observation(number, bins.channel, bins, values, means))
     return tuple(found)
 
 
-def _spread(bins: ChannelBins, times: Array, grid: Array, row: float) -> csr_array:
+def _means(bins: ChannelBins, times: Array, grid: Array, row: float) -> csr_array:
     """Average of what is linear between grid points over the rows of each bin, (b, G + 1)."""
     within = (np.arange(ROW_POINTS) + 0.5) / ROW_POINTS - 0.5 if row > 0.0 else np.zeros(1)
     at = (times[bins.rows][:, None] + row * within).ravel()
