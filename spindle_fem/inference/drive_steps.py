@@ -28,7 +28,9 @@ DIAGNOSED = ClassWidths(3.0, 0.01, 0.01, 120)
 INLET_STEP = 0.5
 # After a change of the inputs what follows at once, balls, rings and films, takes minutes: steps of a minute
 # leave up to 0.25 K there (recorded spindle, started and stopped every quarter of an hour), these 0.02 K.
-SETTLING, SHORT_STEP = 240.0, 20.0
+# The last step before a change is short as well: what changed between two rows may have changed before the
+# later one. Changes below a share of an input's range, as of a speed that was measured, do not count.
+SETTLING, SHORT_STEP, SMALL_CHANGE = 240.0, 20.0, 0.02
 
 
 def _centred(fine: Drive, recording: Recording) -> Drive:
@@ -52,10 +54,16 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
     begin, finish = fine.grid[0], fine.grid[-1]
     beside = covariate_columns(fine.names)
     inputs = np.setdiff1d(np.arange(len(fine.names)), beside)
-    jumps = fine.grid[1:-1][np.any(fine.start[1:, inputs] != fine.end[:-1, inputs], axis=1)]
+    changed = np.abs(fine.start[1:, inputs] - fine.end[:-1, inputs])
+    least = SMALL_CHANGE * np.ptp(fine.start[:, inputs], axis=0)
+    jumps, large = (fine.grid[1:-1][np.any(changed > size, axis=1)] for size in (0.0, least))
     edges = np.unique(np.concatenate(([begin], jumps, [finish])))
-    pieces = [_steps_between(a, b, step) for a, b in itertools.pairwise(edges)]
-    grid = np.append(np.concatenate(pieces), finish)
+    large = np.append(begin, large)
+    since = edges[:-1] - large[np.searchsorted(large, edges[:-1], side="right") - 1]
+    settling = np.maximum(0.0, SETTLING - since)
+    last = np.where(np.isin(edges[1:], large), min(SHORT_STEP, step), 0.0)
+    pieces = map(_steps_between, edges[:-1], edges[1:], settling, last, itertools.repeat(step))
+    grid = np.append(np.concatenate(list(pieces)), finish)
     middle = 0.5 * (grid[:-1] + grid[1:])
     start, end = np.empty((middle.size, len(fine.names))), np.empty((middle.size, len(fine.names)))
     first = np.clip(np.searchsorted(fine.grid, grid[:-1], side="right") - 1, 0, fine.steps.size - 1)
@@ -75,23 +83,27 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
     return Drive(grid, grid, fine.names, start, end, step_class, points, fine.notes)
 
 
-def _steps_between(begin: float, end: float, step: float) -> Array:
-    """Starts of the steps from one change to the next.
+def _steps_between(begin: float, end: float, settling: float, last: float, step: float) -> Array:
+    """Starts of the steps between two changes, the first seconds and the last ones in short steps.
 
-    Stamps a second apart that all jump (an input that flickers) would only cost: no step is cut below them.
+    Between them whole long ones, for one length makes one matrix of the model. Stamps a second apart that all
+    jump (an input that flickers) would only cost: no step is cut below them.
     """
-    short = min(SHORT_STEP, step)
-    settled, before = begin + SETTLING, end - short
-    spans = [(begin, end, short)]
-    if settled + short < before:
-        # The last one is short as well: what changed between two rows may have changed before the later one.
-        spans = [(begin, settled, short), (settled, before, step), (before, end, short)]
-    return np.concatenate(
-        [
-            np.linspace(a, b, max(1, int(np.ceil((b - a) / longest - 1e-6))) + 1)[:-1]
-            for a, b, longest in spans
-        ]
+    whole = max(0, int((end - begin - settling - last + 1e-6) // step))
+    settled, before = end - last - whole * step, end - last
+    short = min(SHORT_STEP, step) if settling > 0.0 or last > 0.0 else step
+    spans = (
+        [(begin, settled, short), (settled, before, step), (before, end, short)]
+        if whole
+        else [(begin, end, short)]
     )
+    return np.concatenate([_evenly(*span) for span in spans])
+
+
+def _evenly(begin: float, end: float, longest: float) -> Array:
+    """Starts of equal steps, none longer than asked."""
+    number = int(np.ceil((end - begin) / longest - 1e-6))
+    return begin + (end - begin) * np.arange(number) / max(1, number)
 
 
 def _means(fine: Drive, grid: Array) -> Array:
