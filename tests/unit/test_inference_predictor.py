@@ -270,6 +270,26 @@ def test_steps_end_where_inputs_jump_and_keep_their_course(predictor, recording)
     assert drive.steps.max() > 2.0 * SHORT_STEP
 
 
+def test_a_speed_that_trembles_makes_no_short_steps(predictor, recording):
+    column = recording.input_names.index("speed")
+    trembles = recording.inputs.copy()
+    trembles[:, column] += np.where(trembles[:, column] > 0.0, np.arange(len(trembles)) % 2, 0)
+    drive = coarse_drive(predictor.fast.spec, replace(recording, inputs=trembles), 100.0)
+    settled = np.min([abs(drive.grid[:-1] - at) for at in (0.0, 600.0, 2500.0, 3200.0)], axis=0) > SETTLING
+    assert drive.steps[settled].min() > 2.0 * SHORT_STEP  # from row to row
+    after = (drive.grid[:-1] >= 600.0) & (drive.grid[:-1] < 600.0 + SETTLING)
+    assert drive.steps[after].max() <= SHORT_STEP + 1e-6
+
+
+def test_readings_of_a_bin_are_held_against_the_mean_over_its_rows(predictor, recording):
+    readings = np.abs(recording.times - 2510.0)[:, None] * np.ones(len(PROBES))
+    own = Predictor(predictor.fast, [replace(recording, temperature=readings)], step=60.0)
+    item = own.observations[0]
+    sharp = np.abs(own.drives[0].grid - 2510.0)
+    expected = item.bins.average(np.interp(recording.times, own.drives[0].grid, sharp))
+    np.testing.assert_allclose(item.at(sharp), expected, rtol=1e-12)
+
+
 def test_covariates_are_means_over_the_steps_and_end_none(predictor, recording):
     """What is recorded beside the inputs flickers as it likes: it costs no steps and keeps its integral."""
     flicker = np.random.default_rng(3).uniform(0.0, 80.0, recording.times.size)
