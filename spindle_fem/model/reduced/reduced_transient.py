@@ -440,5 +440,6 @@ def _carry(group, given, advance, forcing, start):
     for step in range(steps):
         if given[step] >= 0:
             found[step] = start[given[step]]
-        found[step + 1] = np.dot(advance[group[step]], found[step]) + forcing[step]
+        np.dot(advance[group[step]], found[step], found[step + 1])
+        found[step + 1] += forcing[step]
     return found
