@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis_fit import Fit
 
 
@@ -48,6 +49,13 @@ class Hypothesis:
     def score(self) -> float:
         """Logarithm of evidence times prior."""
         return self.fit.log_evidence + self.log_prior - self.course_cost
+
+    def course_kept(self, coarseness: float) -> float:
+        """Share of a gain that is left when the choice of courses is paid.
+
+        On a coarse machine twice: a course follows what its nodes leave as well, which is no noise.
+        """
+        return 1.0 - min(1.0, self.course_share * (tuned.COARSE_COURSES if coarseness > 1.0 else 1.0))
 
     @property
     def keys(self) -> frozenset[tuple[str, str]]:

@@ -40,7 +40,7 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int, coarseness:
     likely = max((h.log_prior for h in hypotheses if len(h.fit.candidates) == 1), default=0.0)
     for item in hypotheses:
         freedom = len(item.fit.coordinates) - len(null.fit.coordinates)
-        gain = (1.0 - item.course_share) * (null.misfit - item.misfit)
+        gain = item.course_kept(coarseness) * (null.misfit - item.misfit)
         if freedom and gain > 0.0:
             # Pairs, and what is on in intervals, were chosen among so many more.
             chosen_among = max(0.0, likely - item.log_prior)

@@ -170,6 +170,9 @@ GAIN_DIVISOR, GAIN_DIVISOR_IN_A_SIZE = 2.0, 1.5
 # validation.generate_networks 74 are right first, 72 without the square root; on seed 5 consistent networks
 # gain up to 75, by two, and effects that leave three times the noise from 50 on.)
 NETWORK_COARSENESS = 3.0
+# Times that the choice of a hidden state's course counts there: where something switched (seven concealed
+# cases) it takes a quarter of the gain at most, where a course followed what the nodes leave 0.44 (two).
+COARSE_COURSES = 2.0
 # An inexact law leaves a residual in proportion to its effect, which any further effect may fit a little:
 # gains beyond the first number grow logarithmically, never slower than the straight gain over the second.
 INEXACT_BEYOND, LARGEST_INEXACT_DIVISOR = 4000.0, 4.0

@@ -114,7 +114,7 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
     """
     in_a_size = tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness))
     null = next(h for h in hypotheses if not h.fit.candidates)
-    gains = [0.5 * (1.0 - h.course_share) * (null.misfit - h.misfit) for h in hypotheses]
+    gains = [0.5 * h.course_kept(coarseness) * (null.misfit - h.misfit) for h in hypotheses]
     if coarseness == 1.0 and all(h.heldout is not None for h in hypotheses):
         gains = [gain + 0.5 * (null.heldout - h.heldout) for gain, h in zip(gains, hypotheses, strict=True)]
     # Within a size; the best set of a size is then compared with other sizes.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.inference import tuned
+from spindle_fem.inference.p_value import detection_p_value
 from spindle_fem.inference.reliability import reliable
 from spindle_fem.inference.verdict import (
     CONTRADICTED_REASON,
@@ -102,6 +103,19 @@ def test_the_choice_of_a_course_costs_a_share_of_what_it_gains():
         next(iter(i.fit.keys))[0]: i.probability for i in rank([state, plain, empty]) if i.fit.keys
     }
     assert probability["thermal_preload"] == pytest.approx(probability["grease_churning"])
+
+
+@pytest.mark.parametrize(
+    ("share", "coarseness", "kept"), [(0.25, 1.0, 0.75), (0.25, 3.0, 0.5), (0.44, 3.0, 0.12), (0.6, 3.0, 0.0)]
+)
+def test_a_course_pays_twice_on_a_coarse_machine_whose_nodes_it_follows(share, coarseness, kept):
+    empty = hypothesis(misfit=1200.0)
+    state = replace(hypothesis(PRELOAD, misfit=756.0), course_share=share)
+    plain = replace(state, course_share=0.0, deviance=1200.0 - 444.0 * kept)
+    paid, same = (tempered([item, empty], coarseness)[0] for item in (state, plain))
+    assert paid == pytest.approx(same)
+    by_chance = [detection_p_value([item, empty], 64, coarseness) for item in (state, plain)]
+    assert by_chance[0] == pytest.approx(by_chance[1])
 
 
 def test_complexity_and_prior_count_in_full():
