@@ -29,7 +29,7 @@ INLET_STEP = 0.5
 # After a change of the inputs what follows at once, balls, rings and films, takes minutes: steps of a minute
 # leave up to 0.25 K there (recorded spindle, started and stopped every quarter of an hour), these 0.02 K.
 # The last step before a change is short as well: what changed between two rows may have changed before the
-# later one. Changes below a share of an input's range, as of a speed that was measured, do not count.
+# later one. Changes below a share of an input, as of a speed that was measured, do not count.
 SETTLING, SHORT_STEP, SMALL_CHANGE = 240.0, 20.0, 0.02
 
 
@@ -55,7 +55,7 @@ def coarse_drive(spec, recording: Recording, step: float) -> Drive:
     beside = covariate_columns(fine.names)
     inputs = np.setdiff1d(np.arange(len(fine.names)), beside)
     changed = np.abs(fine.start[1:, inputs] - fine.end[:-1, inputs])
-    least = SMALL_CHANGE * np.ptp(fine.start[:, inputs], axis=0)
+    least = SMALL_CHANGE * np.abs(fine.start[:, inputs]).max(axis=0)
     jumps, large = (fine.grid[1:-1][np.any(changed > size, axis=1)] for size in (0.0, least))
     edges = np.unique(np.concatenate(([begin], jumps, [finish])))
     large = np.append(begin, large)

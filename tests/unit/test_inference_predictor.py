@@ -279,6 +279,9 @@ def test_a_speed_that_trembles_makes_no_short_steps(predictor, recording):
     assert drive.steps[settled].min() > 2.0 * SHORT_STEP  # from row to row
     after = (drive.grid[:-1] >= 600.0) & (drive.grid[:-1] < 600.0 + SETTLING)
     assert drive.steps[after].max() <= SHORT_STEP + 1e-6
+    trembles[:, column] = 314.0 + np.arange(len(trembles)) % 2
+    drive = coarse_drive(predictor.fast.spec, replace(recording, inputs=trembles), 100.0)
+    assert drive.steps[drive.grid[:-1] > 300.0].min() > 2.0 * SHORT_STEP
 
 
 def test_readings_of_a_bin_are_held_against_the_mean_over_its_rows(predictor, recording):
