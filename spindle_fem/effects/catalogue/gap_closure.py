@@ -13,6 +13,10 @@ from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermContext
 
 OVER_HOUSING, OVER_START = "ring over housing", "ring over start"
+# Differences at which fits begin to close, K, and what they are wide beside that: a ring is a few kelvin over
+# the housing, but tens over its own start, or a wall over the air.
+CLOSED_OVER_HOUSING, CLOSED_OVER_START = (2.0, 4.0, 8.0, 15.0), (4.0, 8.0, 15.0)
+WIDTH_OVER_HOUSING = 0.5
 
 
 class GapClosureTerm(Term):
@@ -116,10 +120,16 @@ class GapClosure(Effect):
                         amplitude="opening",
                         reference=0.8,
                         form=machine.form(key, form),
-                        starts=[{"closing_difference": k} for k in (4.0, 8.0, 15.0)],
+                        starts=self._starts(bool(reads) and machine.kind != "network"),
                     )
                 )
         return tuple(found)
+
+    @staticmethod
+    def _starts(over_housing: bool) -> list[dict[str, float]]:
+        if over_housing:
+            return [{"closing_difference": k, "width": WIDTH_OVER_HOUSING * k} for k in CLOSED_OVER_HOUSING]
+        return [{"closing_difference": k} for k in CLOSED_OVER_START]
 
     @staticmethod
     def _closed_by(machine: MachineView, key: str, seats: tuple[str, ...]) -> tuple[tuple[int, ...], ...]:
