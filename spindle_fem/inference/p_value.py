@@ -53,7 +53,7 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int, coarseness:
     return float(-np.expm1((1.0 + trials / tuned.CANDIDATES_A_TRIAL) * np.log1p(-single)))
 
 
-def heldout_p_value(chosen: Hypothesis, null: Hypothesis) -> float:
+def heldout_p_value(chosen: Hypothesis, null: Hypothesis, coarseness: float = 1.0) -> float:
     """Bound of that probability by held-out readings, for a set that fitted ones chose; 1 without any.
 
     Where nothing is missing, a likelihood of readings to come is x times that which they have once in x times
@@ -62,7 +62,8 @@ def heldout_p_value(chosen: Hypothesis, null: Hypothesis) -> float:
     """
     if chosen.heldout is None or null.heldout is None:
         return 1.0
-    return float(np.exp(-0.5 * max(0.0, null.heldout - chosen.heldout) / tuned.GAIN_DIVISOR))
+    gain = 0.5 * chosen.course_kept(coarseness) * max(0.0, null.heldout - chosen.heldout)
+    return float(np.exp(-gain / (coarseness * tuned.GAIN_DIVISOR)))
 
 
 def closer_periods(fit: Fit) -> tuple[int, float]:

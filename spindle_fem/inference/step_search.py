@@ -116,8 +116,11 @@ def _settle(search: Search, fit: Fit, effect: IntervalEffect, onsets: Onsets) ->
         found = _fitted(search, problem, fit, place, *spans, values)
         if found is None:
             break
-        slow = slow_error_of(problem, found.fit)
-        again = replace(problem, slow=slow)
+        try:
+            again = replace(problem, slow=slow_error_of(problem, found.fit))
+        except NOT_SIMULATED:
+            # It was reached from states that were near, and runs away from the start.
+            break
         found = _simplest(search, again, fit, place, found)
         if best is not None:
             known = _fitted(search, again, fit, place, *_spans(effect, best.fit), best.fit.values)

@@ -100,9 +100,8 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
     """Logarithm of prior, complexity and likelihood over nothing missing, the last as far as it counts.
 
     Complexity (the determinants of Laplace's evidence) counts in full, with
-    amplitudes that may have any order of magnitude (:func:`any_magnitude`). Held-out readings of a machine
-    that is drawn, where all sets have them, are readings like the fitted ones: what a set gains there counts
-    as much.
+    amplitudes that may have any order of magnitude (:func:`any_magnitude`). Held-out readings, where all sets
+    have them, are readings like the fitted ones: what a set gains there counts as much.
 
     Parameters
     ----------
@@ -114,9 +113,10 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
     """
     in_a_size = tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness))
     null = next(h for h in hypotheses if not h.fit.candidates)
-    gains = [0.5 * h.course_kept(coarseness) * (null.misfit - h.misfit) for h in hypotheses]
-    if coarseness == 1.0 and all(h.heldout is not None for h in hypotheses):
-        gains = [gain + 0.5 * (null.heldout - h.heldout) for gain, h in zip(gains, hypotheses, strict=True)]
+    gains = [null.misfit - h.misfit for h in hypotheses]
+    if all(h.heldout is not None for h in hypotheses):
+        gains = [gain + null.heldout - h.heldout for gain, h in zip(gains, hypotheses, strict=True)]
+    gains = [0.5 * h.course_kept(coarseness) * gain for gain, h in zip(gains, hypotheses, strict=True)]
     # Within a size; the best set of a size is then compared with other sizes.
     scores = [
         float(
@@ -235,9 +235,9 @@ def judge(
     by_fitted = rank([replace(h, heldout=None) for h in hypotheses], coarseness)
     fitted = {i.fit.named_keys: i for i in by_fitted}
     likeliest = next((i.fit for i in by_fitted if i.fit.candidates), None)
-    if coarseness == 1.0 and likeliest is not None:
+    if likeliest is not None:
         first = next(h for h in hypotheses if h.fit is likeliest)
-        p_value = min(p_value, heldout_p_value(first, empty.best))
+        p_value = min(p_value, heldout_p_value(first, empty.best, coarseness))
     odds = {keys: _log_odds(item, fitted[empty.fit.named_keys]) for keys, item in fitted.items()}
     nothing = 0.0
     if p_value <= tuned.SIGNIFICANT:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.inference import tuned
-from spindle_fem.inference.p_value import detection_p_value
+from spindle_fem.inference.p_value import detection_p_value, heldout_p_value
 from spindle_fem.inference.reliability import reliable
 from spindle_fem.inference.verdict import (
     CONTRADICTED_REASON,
@@ -79,8 +79,10 @@ def test_held_out_readings_count_among_sets_as_fitted_ones_do():
     assert ranked[0].fit is told.fit
     odds = ranked[0].probability / ranked[1].probability
     assert odds == pytest.approx(np.exp((7.0 - 4.0) / tuned.GAIN_DIVISOR_IN_A_SIZE))
-    # a coarse picture leaves more than noise there, and a set without them has none to compare
-    assert rank([nothing, better, told], 1.1)[0].fit is better.fit
+    # on a coarse machine likewise; a set without them has none to compare
+    ranked = rank([nothing, better, told], 4.0)
+    odds = ranked[0].probability / ranked[1].probability
+    assert odds == pytest.approx(np.exp((7.0 - 4.0) / (2.0 * tuned.GAIN_DIVISOR_IN_A_SIZE)))
     assert rank([nothing, better, replace(told, heldout=None)])[0].fit is better.fit
 
 
@@ -109,13 +111,15 @@ def test_the_choice_of_a_course_costs_a_share_of_what_it_gains():
     ("share", "coarseness", "kept"), [(0.25, 1.0, 0.75), (0.25, 3.0, 0.5), (0.44, 3.0, 0.12), (0.6, 3.0, 0.0)]
 )
 def test_a_course_pays_twice_on_a_coarse_machine_whose_nodes_it_follows(share, coarseness, kept):
-    empty = hypothesis(misfit=1200.0)
-    state = replace(hypothesis(PRELOAD, misfit=756.0), course_share=share)
-    plain = replace(state, course_share=0.0, deviance=1200.0 - 444.0 * kept)
+    empty = replace(hypothesis(misfit=1200.0), heldout=700.0)
+    state = replace(hypothesis(PRELOAD, misfit=756.0), course_share=share, heldout=600.0)
+    plain = replace(state, course_share=0.0, deviance=1200.0 - 444.0 * kept, heldout=700.0 - 100.0 * kept)
     paid, same = (tempered([item, empty], coarseness)[0] for item in (state, plain))
     assert paid == pytest.approx(same)
     by_chance = [detection_p_value([item, empty], 64, coarseness) for item in (state, plain)]
     assert by_chance[0] == pytest.approx(by_chance[1])
+    by_heldout = [heldout_p_value(item, empty, coarseness) for item in (state, plain)]
+    assert by_heldout[0] == pytest.approx(by_heldout[1])
 
 
 def test_complexity_and_prior_count_in_full():
