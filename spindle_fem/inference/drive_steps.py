@@ -1,4 +1,4 @@
-"""Inputs of recordings on the steps of a diagnosis: minutes from change to change, or even ones."""
+"""Inputs of recordings on the steps of a diagnosis: minutes, shorter about changes, or even ones."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 One predictor serves everything: calibration and simulation use it for every
 stamp of a recording; a diagnosis, which runs it thousands of times, on steps
-of a minute from one change of the inputs to the next.
+of a minute from one change of the inputs to the next, shorter about each.
 """
 
 from __future__ import annotations

@@ -1,0 +1,32 @@
+"""Levels that change: what happens to a set that cannot be simulated again."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from spindle_fem.errors import ConvergenceError
+from spindle_fem.inference import step_search
+from spindle_fem.inference.change_points import Changes
+
+
+def test_a_set_that_runs_away_when_it_begins_anew_is_given_up(monkeypatch):
+    def runs_away(problem, fit):
+        raise ConvergenceError("fast model", "the terms run away.")
+
+    kept = []
+    changes = Changes((1,), np.array([20.0]), 30.0)
+    fit = SimpleNamespace(values={}, candidates=())
+    monkeypatch.setattr(step_search, "find_changes", lambda *given: changes)
+    monkeypatch.setattr(step_search, "_spread", lambda *given: 1.0)
+    monkeypatch.setattr(step_search, "_below_known", lambda *given: False)
+    monkeypatch.setattr(step_search, "levels_over_lowest", lambda *given: ((), ()))
+    monkeypatch.setattr(step_search, "_fitted", lambda *given: SimpleNamespace(fit=fit))
+    drives = [SimpleNamespace(grid=np.array([0.0, 100.0]))]
+    search = SimpleNamespace(
+        problem=SimpleNamespace(predictor=SimpleNamespace(drives=drives)), keep=kept.append
+    )
+    onsets = SimpleNamespace(pattern=None, recording=0, times=np.zeros(3), gram=None, data=None)
+    with monkeypatch.context() as once:
+        once.setattr(step_search, "slow_error_of", runs_away)
+        step_search._settle(search, fit, None, onsets)
+    assert kept == []
