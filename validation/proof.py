@@ -129,6 +129,9 @@ def worked_case(studies: dict[str, tuple[Path, Path, dict]], chosen: str | None)
         for row in told["rows"]
         if (chosen == f"{name}/{row['case']}" if chosen else row["right"] and not row["consistent"])
     ]
+    if not rows and chosen:
+        known = ", ".join(studies)
+        raise ValueError(f"--worked {chosen}: no such case. Name one as STUDY/case_0001 of {known}.")
     if not rows:
         return None
 

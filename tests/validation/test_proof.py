@@ -127,3 +127,9 @@ def test_studies_that_stay_on_the_page_have_the_causes_that_are_known_now(data, 
     assert kept["name"] == "earlier"
     assert kept["causes"] == {"case_0002": cause}
     assert kept["rows"] == study["rows"]
+
+
+def test_a_worked_case_that_does_not_exist_is_refused():
+    with pytest.raises(ValueError, match=r"runs/study/case_0001.*STUDY/case_0001 of one"):
+        proof.worked_case({"one": (Path(), Path(), {"rows": []})}, "runs/study/case_0001")
+    assert proof.worked_case({"one": (Path(), Path(), {"rows": []})}, None) is None
