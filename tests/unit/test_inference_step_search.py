@@ -26,7 +26,6 @@ def test_a_set_that_runs_away_when_it_begins_anew_is_given_up(monkeypatch):
         problem=SimpleNamespace(predictor=SimpleNamespace(drives=drives)), keep=kept.append
     )
     onsets = SimpleNamespace(pattern=None, recording=0, times=np.zeros(3), gram=None, data=None)
-    with monkeypatch.context() as once:
-        once.setattr(step_search, "slow_error_of", runs_away)
-        step_search._settle(search, fit, None, onsets)
+    monkeypatch.setattr(step_search, "slow_error_of", runs_away)
+    step_search._settle(search, fit, None, onsets)
     assert kept == []
