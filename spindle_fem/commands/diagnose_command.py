@@ -33,7 +33,7 @@ from spindle_fem.inference.next_measurement import next_measurement
 from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine, with_growth
 from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.inference.worker_processes import Workers
-from spindle_fem.parallel import thread_count
+from spindle_fem.parallel import keep_freed_memory, thread_count
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import write_simulated
 from spindle_fem.results.output_folder import output_folder, replace_text
@@ -118,6 +118,7 @@ def diagnose_without_report(
 def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
     started = time.perf_counter()
     require_choice(request.full_model)
+    keep_freed_memory()
     overrides = tuple(request.overrides)
     tell = request.progress or LOGGER.info
     tell("reading")

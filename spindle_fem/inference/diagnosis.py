@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.registry import candidates_for, catalogue, interval_effects
@@ -34,7 +35,7 @@ from spindle_fem.inference.prepared_problem import (
     with_inexact_laws,
     with_own_noise,
 )
-from spindle_fem.inference.search_basis import searched_predictor
+from spindle_fem.inference.search_basis import smaller_predictors
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.set_problems import SetProblems, combination_of
 from spindle_fem.inference.state_search import InferredState, inferred_states, states_on_rows
@@ -57,7 +58,7 @@ class Diagnosis:
     Attributes
     ----------
     predictor : Predictor
-        Machine on the diagnosed recordings, full basis.
+        Machine on the diagnosed recordings, on the basis of final fits.
     unchanged : Predictor
         The same for nothing missing: what its misdescriptions do without the set that was found.
     hypotheses : tuple of Hypothesis
@@ -124,6 +125,8 @@ class Diagnosis:
         return moment.isoformat()
 
 
+# Threads gain nothing on matrices of a hundred unknowns, and other processes need the cores.
+@threadpool_limits.wrap(limits=1)
 def diagnose_recordings(
     machine: DiagnosedMachine,
     *,
@@ -156,9 +159,10 @@ def diagnose_recordings(
         earlier = Predictor(fast, calibration, effects=machine.effects).with_unseen(unseen)
     directions = misdescriptions_of(predictor)
     calibrating = workers.ahead(partial(_calibrated, earlier, predictor, directions))
-    predictor = with_misdescriptions(predictor, directions)
     candidates = candidates_for(view)
-    small, known = searched_predictor(predictor, view, candidates)
+    small, predictor, known = smaller_predictors(predictor, view, candidates)
+    predictor = with_misdescriptions(predictor, directions)
+    small = small.misdescribed_like(predictor)
     calibrated = calibrating()
     if earlier is not None and machine.is_network:
         belief = calibrated.belief

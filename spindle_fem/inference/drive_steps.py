@@ -30,7 +30,7 @@ INLET_STEP = 0.5
 # leave up to 0.25 K there (recorded spindle, started and stopped every quarter of an hour), these 0.02 K.
 # The last step before a change is short as well: what changed between two rows may have changed before the
 # later one. Changes below a share of an input, as of a speed that was measured, do not count.
-SETTLING, SHORT_STEP, SMALL_CHANGE = 240.0, 20.0, 0.02
+SETTLING, SHORT_STEP, SMALL_CHANGE = 120.0, 20.0, 0.02
 
 
 def _centred(fine: Drive, recording: Recording) -> Drive:

@@ -1,4 +1,4 @@
-"""Final fits: which sets of a search are fitted again on the whole basis, each about its own machine."""
+"""Final fits: which sets of a search are fitted again on a larger basis, each about its own machine."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def to_be_fitted(
 
 
 def fitted_sets(problems: SetProblems, chosen: Sequence[Hypothesis], workers: Workers) -> list[Hypothesis]:
-    """Hypotheses fitted on the whole basis, each to its own problem; the first one first."""
+    """Hypotheses fitted on a larger basis, each to its own problem; the first one first."""
     first = chosen[0]
     # Sets far behind the first need not be fitted to their optimum, but for its parts: they are what is
     # named where the rest of it is not needed.

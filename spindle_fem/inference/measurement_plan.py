@@ -46,7 +46,7 @@ from spindle_fem.inference.prepared_problem import calibrate
 from spindle_fem.inference.reading_noise import Whitener
 from spindle_fem.inference.schedules import Schedule
 from spindle_fem.inference.screening import amplitude_spread, amplitude_value, is_one_sided, log_priors
-from spindle_fem.inference.search_basis import searched_predictor
+from spindle_fem.inference.search_basis import smaller_predictors
 from spindle_fem.inference.told_apart import ChannelProducts, EffectForms, Separation
 
 Array = NDArray[np.float64]
@@ -202,7 +202,7 @@ def plan_measurement(
     spots = _interval_candidates(machine.view, float(np.ptp(machine.recordings[0].times)))
     places = _places(machine, predictor)
     progress("plan: basis")
-    small, _ = searched_predictor(predictor, machine.view, candidates, [place.name for place in places])
+    small, *_ = smaller_predictors(predictor, machine.view, candidates, [place.name for place in places])
     problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
     variants = variants_of(candidates) + variants_of(spots)
     forms, hypotheticals = _forms(variants)

@@ -1,4 +1,4 @@
-"""The smaller basis on which hypotheses are searched: what the diagnosed recordings themselves can excite."""
+"""Smaller bases on which hypotheses are searched and refitted: what the diagnosed recordings can excite."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ PLACE_RATES = (0.0, 3e-4, 3e-3)
 PLACE_HEAT = 50.0
 
 
-def searched_predictor(
+def smaller_predictors(
     predictor: Predictor, view: MachineView, candidates: Sequence[Candidate], read: Sequence[str] = ()
-) -> tuple[Predictor, frozenset[str]]:
-    """The recordings on the basis of a search, and the places of the model where something may act.
+) -> tuple[Predictor, Predictor, frozenset[str]]:
+    """The recordings on the bases of a search and of final fits, and the places where something may act.
 
     A network is small enough as it is.
 
@@ -45,16 +45,16 @@ def searched_predictor(
     places |= {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)} | {*read}
     known = places & {*predictor.fast.model.place_names}
     if predictor.is_network:
-        return predictor, frozenset(known)
+        return predictor, predictor, frozenset(known)
     contacts = sorted({name for own in view.joint_coefficients.values() for name in own})
     names = [prior.name for prior in predictor.uncertain()]
-    return on_search_basis(predictor, names, sorted(known), contacts), frozenset(known)
+    return *on_smaller_bases(predictor, names, sorted(known), contacts), frozenset(known)
 
 
-def on_search_basis(
+def on_smaller_bases(
     predictor: Predictor, names: Sequence[str], places: Sequence[str], contacts: Sequence[str] = ()
-) -> Predictor:
-    """The recordings on the smaller basis that they need.
+) -> tuple[Predictor, Predictor]:
+    """The recordings on the smaller bases that a search and final fits need.
 
     States and their sensitivities of every recording, with the machine's
     parameters at their prior values and two standard deviations to either
@@ -100,11 +100,16 @@ def on_search_basis(
     uniform = model.one / np.linalg.norm(model.one)
     rest = np.hstack([_scaled(item) for item in snapshots])
     rest -= np.outer(uniform, uniform @ rest)
-    vectors, values, _ = np.linalg.svd(rest, full_matrices=False)
-    kept = int(np.sum(values > tuned.BASIS_TOLERANCE * values[0]))
-    basis = np.column_stack((uniform, vectors[:, :kept]))
-    spread = np.concatenate((values[:1], values[:kept]))
-    return predictor.with_model(predictor.fast.projected(basis, spread), tuned.SAME_OPERATORS_WITHIN)
+    squares, vectors = np.linalg.eigh(rest @ rest.T)
+    values, vectors = np.sqrt(np.maximum(squares[::-1], 0.0)), vectors[:, ::-1]
+
+    def within(tolerance: float, same: float) -> Predictor:
+        kept = int(np.sum(values > tolerance * values[0]))
+        basis = np.column_stack((uniform, vectors[:, :kept]))
+        spread = np.concatenate((values[:1], values[:kept]))
+        return predictor.with_model(predictor.fast.projected(basis, spread), same)
+
+    return within(tuned.SEARCH_BASIS, tuned.SAME_OPERATORS_WITHIN), within(tuned.FINAL_BASIS, 0.0)
 
 
 def _place_snapshots(predictor: Predictor, run: TransientRun, places: Sequence[str]) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.misdescription import Change, Misdescription
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.fast_model import FastModel, ModelInputs
 from spindle_fem.model.reduced.structural_model import StructuralModel, structural_model_of
 
 Array = NDArray[np.float64]
@@ -24,8 +24,8 @@ TOLD_IN = {"m": ("mm", 1e-3)}
 SAME_WITHIN = 0.01
 # Columns of all directions (G + 1, c, n), which one march gives together.
 _known: WeakKeyDictionary[BaseRun, dict[str, Array]] = WeakKeyDictionary()
-# The model with the directions of every fast model in use.
-_models: WeakKeyDictionary[FastModel, StructuralModel] = WeakKeyDictionary()
+# The model with the directions of every machine in use: the same whatever the basis of its fast model.
+_models: WeakKeyDictionary[ModelInputs, StructuralModel] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +66,6 @@ def structural_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]
 
 def model_with_directions(fast: FastModel) -> StructuralModel:
     """The fast model that may be differentiated by its directions, made or fetched once."""
-    if fast not in _models:
-        _models[fast] = structural_model_of(fast)
-    return _models[fast]
+    if fast.inputs not in _models:
+        _models[fast.inputs] = structural_model_of(fast)
+    return _models[fast.inputs]

@@ -71,8 +71,9 @@ ROOM_DAILY, ROOM_DAYS = 0.8, 4.0 * 86400.0
 ROOM_SLOW, ROOM_HOURS = 0.4, 6.0 * 3600.0
 
 # ------------------------------------------------------------------------------------ basis of a search
-# Singular values below this share of the largest are left out.
-BASIS_TOLERANCE = 1.0e-3
+# Singular values below this share of the largest are left out, in a search and in final fits: readings are
+# 4 mK and 2 mK off the whole basis (root mean square, recorded spindle), sets differ by a tenth of that.
+SEARCH_BASIS, FINAL_BASIS = 1.0e-3, 3.0e-4
 # Factor on each contact whose states join the basis; without them loose joints were named too rarely.
 OPENED_CONTACT = 0.1
 # Operating points whose coefficients differ by less than this share use the same operators while searching:

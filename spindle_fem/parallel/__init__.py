@@ -13,6 +13,7 @@ thing after the other. Workers compute with one thread each.
 from __future__ import annotations
 
 from spindle_fem.parallel.background_process import BackgroundProcess, can_be_copied
+from spindle_fem.parallel.kept_memory import keep_freed_memory
 from spindle_fem.parallel.process_copies import in_copies, start_copy
 from spindle_fem.parallel.worker_pool import Shared, WorkerPool
 from spindle_fem.parallel.worker_threads import (
@@ -35,6 +36,7 @@ __all__ = [
     "hand_over",
     "in_copies",
     "in_threads",
+    "keep_freed_memory",
     "one_thread",
     "start_copy",
     "thread_count",

@@ -14,7 +14,7 @@ from spindle_fem.commands.simulate_command import simulate_machine
 from spindle_fem.definition.load import load_machine
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.search_basis import on_search_basis
+from spindle_fem.inference.search_basis import on_smaller_bases
 from spindle_fem.machine.view.place_names import ACROSS, UP
 from spindle_fem.model.reduced import build_reduced as building
 from spindle_fem.model.reduced.build_reduced import ReductionOptions, reduced_model_of
@@ -293,8 +293,8 @@ def test_the_basis_of_a_search_holds_what_a_single_seat_changes(fast, made):
     places = [name for name in fast.model.place_names if name.endswith("_raceway")]
     seats = [f"joint.{name}.outer_ring|housing" for name in ("R1", "R2")]
     with_seats, without = (
-        on_search_basis(predictor, parameters, places, seats),
-        on_search_basis(predictor, parameters, places),
+        on_smaller_bases(predictor, parameters, places, seats)[0],
+        on_smaller_bases(predictor, parameters, places)[0],
     )
     assert without.fast.model.size < with_seats.fast.model.size < fast.model.size
     errors = []

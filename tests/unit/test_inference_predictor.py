@@ -16,7 +16,7 @@ from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, known_before, start_coordinates
 from spindle_fem.inference.recording_gaps import hidden_in
-from spindle_fem.inference.search_basis import on_search_basis
+from spindle_fem.inference.search_basis import on_smaller_bases
 from spindle_fem.inference.unseen_moments import unread_changes
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.drive import drive_of_recording
@@ -418,8 +418,8 @@ def test_changes_between_rows_that_were_held_out_are_told_by_all_readings(predic
 
 def test_the_small_basis_reads_what_the_large_one_does(predictor, candidates):
     places = [name for name in predictor.fast.model.place_names if "raceway" in name]
-    small = on_search_basis(predictor, [prior.name for prior in predictor.uncertain()], places)
-    assert small.fast.model.size < predictor.fast.model.size
+    small, final = on_smaller_bases(predictor, [prior.name for prior in predictor.uncertain()], places)
+    assert small.fast.model.size < final.fast.model.size < predictor.fast.model.size
     preload = candidates["thermal_preload", ""]
     values = {**NOW, **values_of(preload), "probe.SP02.r": 1e-3}
     names = ["heat.front", "probe.SP02.r", *coordinate_names(preload)]
