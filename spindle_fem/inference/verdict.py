@@ -242,6 +242,7 @@ def judge(
     nothing = 0.0
     if p_value <= tuned.SIGNIFICANT:
         ranked = _without(ranked, empty)
+    by_all = {item.fit.named_keys: item.probability for item in ranked}
     if coarseness == 1.0:
         ranked = with_needed_thirds(ranked)
     ranked = likeliest_first(ranked, overlapping or {})
@@ -313,7 +314,9 @@ def judge(
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
         for item in rivals
-        if (known * item.probability >= tuned.LISTED or item in near) and item.fit.candidates
+        # A third effect that held-out readings doubt is listed.
+        if (known * max(item.probability, by_all[item.fit.named_keys]) >= tuned.LISTED or item in near)
+        and item.fit.candidates
     )
     # What every likely set holds is sure, whether there is more or not.
     common = sum(item.probability for item in ranked if holds(item.fit, chosen.fit, known_as_one))
