@@ -9,7 +9,7 @@ from typing import Any
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference.hypothesis_fit import MOST_ITERATIONS, NOT_SIMULATED, Fit, Problem, amplitude_name
-from spindle_fem.parallel import Shared, WorkerPool, can_be_copied, in_copies, start_copy
+from spindle_fem.parallel import Shared, StandingCopies, WorkerPool, can_be_copied, in_copies, start_copy
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +69,7 @@ class Workers:
     def __init__(self, number: int = 1) -> None:
         self._number, self._pool = number, WorkerPool(number)
         self._shared: dict[int, Shared[Problem]] = {}
+        self._copies: StandingCopies[Problem] | None = None
 
     def wake(self) -> None:
         """Start the other processes, where that takes them seconds, while this one has other things to do."""
@@ -95,6 +96,8 @@ class Workers:
         jobs : sequence of callable
             That can be sent to another process: functions of modules, perhaps with some arguments given.
         """
+        if isinstance(problem, Problem) and can_be_copied():
+            return self._copies_with(problem).map(jobs)
         problems = [problem] * len(jobs) if isinstance(problem, Problem) else problem
         if can_be_copied():
             return in_copies(
@@ -108,6 +111,14 @@ class Workers:
             partial(_on_problem, self._shared[id(own)], job) for job, own in zip(jobs, problems, strict=True)
         ]
         return self._pool.map(orders)
+
+    def _copies_with(self, problem: Problem) -> StandingCopies[Problem]:
+        """Copies that have a problem: those that are there, for the problem of a search; else new ones."""
+        if self._copies is None or self._copies.value is not problem:
+            if self._copies is not None:
+                self._copies.close()
+            self._copies = StandingCopies(problem, self._number)
+        return self._copies
 
     def beside(self, jobs: Sequence[Callable[[], Any]]) -> list[Any]:
         """Result of each job, in order; in this process alone where it cannot be copied.

@@ -4,7 +4,8 @@ A job is a callable without arguments. :func:`in_threads` runs jobs that leave t
 interpreter lock alone (compiled loops, compression); a :class:`WorkerPool` runs jobs in
 other processes of this machine or behind a Dask scheduler; a :class:`BackgroundProcess`
 keeps one object in a copy of this process and answers calls of its methods in their order;
-:func:`in_copies` runs jobs in copies of this process, to which nothing need be sent.
+:func:`in_copies` runs jobs in copies of this process, to which nothing need be sent, and
+:class:`StandingCopies` are such copies that stay.
 
 ``SPINDLE_FEM_THREADS`` limits all of them; with 1 everything happens in this process, one
 thing after the other. Workers compute with one thread each.
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 from spindle_fem.parallel.background_process import BackgroundProcess, can_be_copied
 from spindle_fem.parallel.kept_memory import keep_freed_memory
-from spindle_fem.parallel.process_copies import in_copies, start_copy
+from spindle_fem.parallel.process_copies import StandingCopies, in_copies, start_copy
 from spindle_fem.parallel.worker_pool import Shared, WorkerPool
 from spindle_fem.parallel.worker_threads import (
     beside,
@@ -29,6 +30,7 @@ from spindle_fem.parallel.worker_threads import (
 __all__ = [
     "BackgroundProcess",
     "Shared",
+    "StandingCopies",
     "WorkerPool",
     "beside",
     "can_be_copied",
