@@ -110,16 +110,21 @@ class StandingCopies(Generic[Value]):
             return [job(self.value) for job in jobs]
         self._standing.claims.restart()
         sent = _dumps(list(jobs))
-        waiting = [other.ask("sent", sent) for other in self._others]
-        found = self._standing.work_off(jobs)
-        for answers in waiting:
-            found |= pickle.loads(answers())
+        try:
+            waiting = [other.ask("sent", sent) for other in self._others]
+            found = self._standing.work_off(jobs)
+            for answers in waiting:
+                found |= pickle.loads(answers())
+        except BaseException:
+            # A copy may still be at these jobs, and would claim those of the next time.
+            self.close()
+            raise
         return [found[place] for place in range(len(jobs))]
 
     def close(self) -> None:
-        """End the copies."""
-        for other in self._others:
-            other.close()
+        """End the copies; this process works alone from then on."""
+        while self._others:
+            self._others.pop().close()
 
 
 def in_copies(jobs: Sequence[Job], number: int) -> list[Any]:

@@ -52,6 +52,19 @@ def test_a_verdict_doubts_thirds_of_a_machine_that_is_drawn():
         assert len(found.chosen.fit.keys) == members
 
 
+def test_a_third_that_held_out_readings_doubt_is_listed_where_it_is_likely_otherwise():
+    nothing = replace(hypothesis(misfit=2000.0), heldout=900.0)
+    pair = replace(hypothesis(PRELOAD, CHURNING, misfit=400.0), heldout=500.0)
+    triple = replace(hypothesis(PRELOAD, CHURNING, OFFSET, misfit=380.0), heldout=540.0)
+    shares = {len(i.fit.keys): i.probability for i in rank([nothing, pair, triple], 1.0)}
+    even = -float(np.log(shares[3] / shares[2]))
+    for log_odds, listed in ((1.0, [3]), (-6.0, [])):
+        found = verdict(nothing, pair, replace(triple, log_prior=even + log_odds), calibrated=True)
+        assert len(found.chosen.fit.keys) == 2
+        assert [len(i.fit.keys) for i in found.alternatives] == listed
+        assert all(i.probability < 0.02 for i in found.alternatives)
+
+
 def test_what_is_likelier_at_places_that_count_as_one_is_named_first():
     """Split between a bearing and its set it is behind another effect, together ahead of it."""
     group = dict.fromkeys(("front_bearings", "F1"), frozenset({"F1", "front_bearings"}))

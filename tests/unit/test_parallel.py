@@ -1,11 +1,13 @@
 """Threads, worker processes and the background process: order, errors, deaths, what is sent when."""
 
 import os
+import platform
 import re
 import signal
 import subprocess
 import sys
 import threading
+import time
 import types
 from functools import partial
 from pathlib import Path
@@ -15,7 +17,15 @@ import pytest
 import spindle_fem
 from spindle_fem import parallel
 from spindle_fem.errors import BadInputError, WorkerDiedError
-from spindle_fem.parallel import BackgroundProcess, Shared, WorkerPool, in_copies, start_copy, worker_pool
+from spindle_fem.parallel import (
+    BackgroundProcess,
+    Shared,
+    StandingCopies,
+    WorkerPool,
+    in_copies,
+    start_copy,
+    worker_pool,
+)
 
 SEVERAL_CORES = parallel.core_count() > 1
 
@@ -294,6 +304,62 @@ def test_errors_and_answers_that_are_functions_come_from_copies():
 def test_a_copy_that_dies_is_an_error():
     with pytest.raises(WorkerDiedError, match="its process ended before its time"):
         start_copy(partial(die_beside, os.getpid()))()
+
+
+def note(number, noted):
+    noted.append(number)
+    time.sleep(0.05)
+    return os.getpid(), number, tuple(noted)
+
+
+def fail_first(number, noted):
+    return note(number, noted) if number else refuse()
+
+
+@pytest.mark.skipif(not SEVERAL_CORES, reason="works in this process on one core")
+def test_standing_copies_keep_what_jobs_leave_with_them():
+    with StandingCopies([], 2) as copies:
+        rounds = [copies.map([partial(note, number) for number in own]) for own in (range(4), range(4, 8))]
+        assert [number for answers in rounds for _, number, _ in answers] == list(range(8))
+        first, second = ({process for process, *_ in answers} for answers in rounds)
+        assert first == second
+        assert len(first) == 2
+        for process in first:
+            own = [(number, noted) for answers in rounds for by, number, noted in answers if by == process]
+            assert own[-1][1] == tuple(number for number, _ in own)
+
+
+def test_standing_copies_that_failed_are_not_met_again():
+    noted = []
+    with StandingCopies(noted, 2) as copies:
+        with pytest.raises(BadInputError, match="it was refused"):
+            copies.map([partial(fail_first, number) for number in range(6)])
+        answers = copies.map([partial(note, number) for number in range(10, 14)])
+    assert [(process, number) for process, number, _ in answers] == [(os.getpid(), n) for n in range(10, 14)]
+    assert noted[-4:] == [10, 11, 12, 13]
+
+
+FAULTS = """
+import resource
+import numpy as np
+from spindle_fem.parallel import keep_freed_memory
+
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    np.ones(4_000_000)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+given_back = [faults(), faults()][1]
+keep_freed_memory()
+print(given_back, [faults(), faults()][1])
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another library of C keeps what it likes")
+def test_freed_arrays_are_kept():
+    told = subprocess.run([sys.executable, "-c", FAULTS], capture_output=True, text=True, check=True)
+    given_back, kept = map(int, told.stdout.split())
+    assert kept < 0.01 * given_back
 
 
 def _runs(pid):
