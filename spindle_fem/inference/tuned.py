@@ -151,13 +151,13 @@ STATE_PLACES, STEP_PLACES = 2, 3
 HOPELESS = 60.0
 
 # ------------------------------------------------------------------------------------------ final fits
-# Hypotheses that are fitted again on the whole basis: at most, at least, and how much less likely than the
+# Hypotheses that are fitted again on the larger basis: at most, at least, and how much less likely than the
 # best they may be beyond the least number.
 REFITTED, ALWAYS_REFITTED, NEGLIGIBLE_SCORE = 8, 2, 8.0
 # Places and forms of one combination of effects among them.
 REFITTED_OF_EACH = 3
 # Other sets whose readings are nearest the best set's are fitted again as well: their number, and how many
-# times the limits NEAR_READINGS and NEAR_MISFIT below they may differ, as the whole basis may move them.
+# times the limits NEAR_READINGS and NEAR_MISFIT below they may differ, as the larger basis may move them.
 NEAREST_REFITTED, NEAREST_WITHIN = 3, 1.3
 
 # --------------------------------------------------------------------------------------------- verdict
