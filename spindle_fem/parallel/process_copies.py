@@ -26,10 +26,13 @@ class _Claims:
         self._next.value = 0
 
     def work_off(self, jobs: Sequence[Job]) -> dict[int, Any]:
-        """Answers of the jobs that this process claimed, by their places."""
+        """Answers of the jobs that this process claimed, by their places; as the others with one thread."""
+        from threadpoolctl import threadpool_limits
+
         found = {}
-        while (place := self._claimed()) < len(jobs):
-            found[place] = jobs[place]()
+        with threadpool_limits(1):
+            while (place := self._claimed()) < len(jobs):
+                found[place] = jobs[place]()
         return found
 
     def _claimed(self) -> int:
