@@ -26,7 +26,7 @@ from spindle_fem.inference.hidden_states import (
     without,
 )
 from spindle_fem.inference.hypothesis import Hypothesis, identity
-from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem, amplitude_name
+from spindle_fem.inference.hypothesis_fit import MOST_ITERATIONS, NOT_SIMULATED, Fit, Problem, amplitude_name
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
@@ -255,10 +255,15 @@ def _settle_again(search: Search, fit: Fit, candidate: Candidate) -> None:
         settle(search, fit, *twin, candidate)
 
 
-def simulated(search: Search, candidates: tuple[Candidate, ...], values: Mapping[str, float]) -> Fit | None:
+def simulated(
+    search: Search,
+    candidates: tuple[Candidate, ...],
+    values: Mapping[str, float],
+    iterations: int = MOST_ITERATIONS,
+) -> Fit | None:
     """A fit; None where the set cannot be simulated."""
     try:
-        return search.problem.fit(candidates, values)
+        return search.problem.fit(candidates, values, iterations=iterations)
     except NOT_SIMULATED:
         return None
 
