@@ -159,10 +159,16 @@ def _beside(search: Search) -> None:
 
 
 def _second_state(search: Search) -> None:
-    """Look for another state beside the best one, before laws take up what it does."""
+    """Look for another state beside the best one, before laws take up what it does, and for one beside laws.
+
+    The course of a state that was found alone has taken up what a law at its place does.
+    """
     best = search.ranked()[0]
     if any(search.is_hidden_state(c) for c in best.fit.candidates) and not _leaves_little(search, best):
+        laws = [h.fit for h in _different(search, search.ranked()) if h.keys and _only_laws(search, h)]
         add_states(search, best.fit, 1)
+        for fit in laws[: tuned.LAWS_BESIDE_A_STATE]:
+            add_states(search, fit, 1)
 
 
 def _leaves_little(search: Search, best: Hypothesis) -> bool:
