@@ -1,4 +1,4 @@
-"""Two things that switch at once in a written network: heat at one node, cooling of another."""
+"""Two causes at once in a written network, one of which switches: heat at a node, cooling of another."""
 
 from itertools import pairwise
 
@@ -25,8 +25,14 @@ def course(generator, shortest, longest, begin):
     return found
 
 
-def switching(heated, cooled):
-    """Temperatures of the nodes with heat at the bearing, and the body cooled more, in intervals."""
+def switching(heated, cooled, share_of_speed=1.0):
+    """Temperatures of the nodes with heat at the bearing, and the body cooled more, in intervals.
+
+    Parameters
+    ----------
+    share_of_speed : float
+        Of what the bearing heats at a speed, all through.
+    """
 
     def temperatures(built, times):
         def slope(time, state):
@@ -37,7 +43,7 @@ def switching(heated, cooled):
             share = MORE if any(a <= middle < b for a, b in cooled) else 1.0
             one = built["winding|body"] * (winding - body)
             two = built["bearing|body"] * (bearing - body)
-            heat = built["speed"] * (speed / 1000.0) ** 1.5 + more
+            heat = share_of_speed * built["speed"] * (speed / 1000.0) ** 1.5 + more
             out = share * built["body|ambient"] * (body - room)
             return [
                 (built["power"] * power - one) / built["winding"],
@@ -82,3 +88,24 @@ def test_heat_and_cooling_that_switch_at_once_are_both_named(monkeypatch, tmp_pa
     more = (MORE - 1.0) * as_built(3)["body|ambient"]
     assert found["unrecorded_cooling"]["parameters"]["conductance"]["value"] == pytest.approx(more, rel=0.15)
     assert content["fit"]["after"]["train_rmse_K"] < 0.5 * content["fit"]["before"]["train_rmse_K"]
+
+
+@pytest.mark.slow
+def test_heat_that_switches_is_told_beside_a_share_that_is_off_at_the_same_node(monkeypatch, tmp_path):
+    """Found alone, what switches takes up the share: its course is sought anew beside the best laws."""
+    heated = course(np.random.default_rng(5), 500.0, 1500.0, 1500.0)
+    monkeypatch.setattr(flawed_network, "PROGRAMME", POWERS)
+    times = np.arange(0.0, STOP + 1.0, 60.0)
+    monkeypatch.setattr(flawed_network, "temperatures", switching((), ()))
+    calibration = record(tmp_path / "calibration", 3, times=times)
+    monkeypatch.setattr(flawed_network, "temperatures", switching(heated, (), 1.7))
+    run = record(tmp_path / "run", 3, times=times)
+    machine = tmp_path / "machine.toml"
+    machine.write_text(MACHINE)
+    content = diagnose_without_report(machine, [run], tmp_path / "out", calibrate=[calibration])
+    found = {item["effect"]: item for item in content["findings"]}
+    assert {(name, item["component"]) for name, item in found.items()} == {
+        ("unrecorded_heat_source", "bearing"),
+        ("heat_scale", "bearing"),
+    }
+    assert found["unrecorded_heat_source"]["parameters"]["heat"]["value"] == pytest.approx(HEAT, rel=0.1)
