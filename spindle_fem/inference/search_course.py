@@ -164,10 +164,12 @@ def _second_state(search: Search) -> None:
     The course of a state that was found alone has taken up what a law at its place does.
     """
     best = search.ranked()[0]
-    if any(search.is_hidden_state(c) for c in best.fit.candidates) and not _leaves_little(search, best):
+    places = {c.component for c in best.fit.candidates if search.is_hidden_state(c)}
+    if places and not _leaves_little(search, best):
         laws = [h.fit for h in _different(search, search.ranked()) if h.keys and _only_laws(search, h)]
+        there = [fit for fit in laws if places & {c.component for c in fit.candidates}]
         add_states(search, best.fit, 1)
-        for fit in laws[: tuned.LAWS_BESIDE_A_STATE]:
+        for fit in there[: tuned.LAWS_BESIDE_A_STATE]:
             add_states(search, fit, 1)
 
 

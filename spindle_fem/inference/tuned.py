@@ -147,7 +147,7 @@ MOST_IN_GAPS = 0.5
 # from which another one follows, and places whose states, and whose levels, are settled so.
 COURSE_ROUNDS, WORTH_ANOTHER = 4, 2.0
 STATE_PLACES, STEP_PLACES = 2, 3
-# Best laws beside which a state is looked for anew where one that was found alone leaves much.
+# Best laws at its place beside which a state is looked for anew where it leaves much alone.
 LAWS_BESIDE_A_STATE = 3
 # Misfit beyond that of a course of levels from which one with a change less is not followed to its optimum.
 HOPELESS = 60.0

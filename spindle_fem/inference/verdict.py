@@ -240,7 +240,9 @@ def judge(
         p_value = min(p_value, heldout_p_value(first, empty.best, coarseness))
     odds = {keys: _log_odds(item, fitted[empty.fit.named_keys]) for keys, item in fitted.items()}
     nothing = 0.0
-    if p_value <= tuned.SIGNIFICANT:
+    # A coarse machine leaves errors of its own, which no p-value knows: what is likelier than all sets stays.
+    stays = coarseness > 1.0 and empty.probability > tuned.STILL_POSSIBLE
+    if p_value <= tuned.SIGNIFICANT and not stays:
         ranked = _without(ranked, empty)
     by_all = {item.fit.named_keys: item.probability for item in ranked}
     if coarseness == 1.0:

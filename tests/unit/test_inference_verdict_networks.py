@@ -91,3 +91,17 @@ def test_what_one_set_gains_over_another_of_its_size_counts_less_where_the_model
         odds.append(np.log(likely[sets[1].keys] / likely[sets[2].keys]))
     assert odds[0] == pytest.approx(2.0 * odds[1])
     assert odds[0] == pytest.approx(9.0 / tuned.GAIN_DIVISOR_IN_A_SIZE)
+
+
+def test_nothing_missing_of_a_coarse_machine_stays_where_it_is_likelier_than_all_sets():
+    """A machine that a definition describes coarsely leaves more than chance does, whatever the p-value."""
+    dear = candidate("grease_churning")
+    for evidence, coarse, exact in (
+        (-230.0, "consistent", "missing_physics"),
+        (-200.0, "missing_physics", "missing_physics"),
+    ):
+        found = hypothesis(misfit=480.0, log_prior=-0.5), hypothesis(dear, misfit=400.0, evidence=evidence)
+        for coarseness, expected in ((1.1, coarse), (1.0, exact)):
+            said = verdict(*found, coarseness=coarseness)
+            assert (said.verdict, coarseness) == (expected, coarseness)
+            assert said.p_value < tuned.RULED_OUT
