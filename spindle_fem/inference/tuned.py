@@ -211,6 +211,8 @@ DECIDED, LIKELIER_RIGHT = 0.75, 0.5
 # evidence gives the other the third. The second, a difference of misfits, bounds what is fitted again for
 # this, and what a plan counts as told apart.
 NEAR_READINGS, NEAR_MISFIT, NEAR_PROBABILITY = 0.5, 14.0, 0.01
+# Share of the noise within which two sets read the same, so that the one with fewer free values is named.
+SAME_READINGS = 0.1
 # Probability from which another set is listed.
 LISTED = 0.02
 # Level of the p-value below which something is missing, and below which nothing missing is ruled out;
