@@ -48,7 +48,7 @@ class SetProblems:
     def about(self, fits: Sequence[Fit], workers: Workers) -> SetProblems:
         """With one of its own for every other combination of effects, about the first set of each.
 
-        Combinations that cannot be simulated there have that of the first set.
+        Combinations that cannot be simulated have that of the first set.
         """
         directions = self.first.predictor.misdescribed
         new: dict[tuple[str, ...], Fit] = {}
