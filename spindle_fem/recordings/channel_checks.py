@@ -203,6 +203,7 @@ def temperature_flags(
     kept = rows
     for _ in range(SPIKE_PASSES):  # a spike beside another shows once the first is out
         spikes = _spikes(kelvin[kept], noise, white) | _swings(kelvin[kept], noise, white)
+        spikes |= _spikes_amid_changes(kelvin[kept], noise, white)
         flags[kept[spikes]] |= np.uint8(Flag.SPIKE)
         if not spikes.any():
             break
@@ -229,6 +230,28 @@ def _spikes(values: Array, noise: float, white: float) -> NDArray[np.bool_]:
     # the first and the last reading have neighbours on one side only: they may be the start of a change
     least[[0, -1]] *= SPIKE_EDGE_FACTOR
     return departures > np.maximum(least, SPIKE_STANDS_OUT * roughness)
+
+
+def _spikes_amid_changes(values: Array, noise: float, white: float) -> NDArray[np.bool_]:
+    """Readings beyond both neighbours amid a steep change that goes on after them as it came.
+
+    The change common to both flanks is no roughness here. With the reading
+    replaced by the mean of its neighbours nothing near it may bend as sharply
+    as it departs: a true peak and a swinging temperature do.
+    """
+    reach = SPIKE_WINDOW
+    windows = sliding_window_view(np.pad(values, reach, mode="reflect"), 2 * reach + 1).copy()
+    earlier, before, after, later = windows[:, [reach - 2, reach - 1, reach + 1, reach + 2]].T
+    line = windows[:, reach] = 0.5 * (before + after)
+    slopes = np.stack([before - earlier, 0.5 * (after - before), later - after])
+    roughness = np.abs(slopes - np.median(slopes, axis=0)).max(axis=0)
+    bends = np.abs(np.diff(windows, n=2, axis=1)).max(axis=1)
+    roughness, bends = (np.maximum(0.0, item - SPIKE_ROUGHNESS_SIGMAS * white) for item in (roughness, bends))
+    beyond = np.maximum(values - np.maximum(before, after), np.minimum(before, after) - values)
+    least = np.full(values.size, max(DROPOUT_SIGMAS * noise, DROPOUT_FLOOR))
+    least[[0, 1, -2, -1]] = np.inf  # one flank is not known there
+    found = beyond > np.maximum(least, SPIKE_STANDS_OUT * roughness)
+    return found & (np.abs(values - line) > SPIKE_STANDS_OUT * bends)
 
 
 def _swings(values: Array, noise: float, white: float) -> NDArray[np.bool_]:

@@ -136,6 +136,16 @@ def test_two_spikes_to_either_side_are_both_flagged(first, second):
     assert np.flatnonzero(flags).tolist() == [40, 41]
 
 
+@pytest.mark.parametrize("size", [7.0, -7.0, 31.0])
+def test_spike_amid_a_start_is_flagged(size):
+    time = np.arange(200.0)
+    values = 296.0 + 12.0 * (1.0 - np.exp(-np.maximum(0.0, time - 99.0) / 8.0))
+    values += 0.05 * np.random.default_rng(3).standard_normal(200)
+    assert not temperature_flags(values, 0.05, 0.1, judge_stuck=True).any()
+    values[101] += size
+    assert np.flatnonzero(temperature_flags(values, 0.05, 0.1, judge_stuck=True)).tolist() == [101]
+
+
 @pytest.mark.parametrize("samples", [2, 3, 4, 7])
 def test_what_swings_all_the_time_is_no_pair_of_spikes(samples):
     swing = 300.0 + 3.0 * np.sin(2.0 * np.pi * np.arange(200) / samples + 0.4)
