@@ -108,9 +108,7 @@ class BaseRun:
         found[:, read:] = self.places @ tangent
         for number in np.unique(owner):
             operators, rows = self.run.operators[number], np.flatnonzero(owner == number)
-            found[rows, :read] = np.einsum(
-                "or,nrm->nom", operators.outputs[self.columns], tangent[rows], optimize=True
-            )
+            found[rows, :read] = operators.outputs[self.columns] @ tangent[rows]
             if inlet is not None:
                 direct = operators.output_inputs[self.columns, column]
                 found[rows, :read] += direct[None, :, None] * inlet[rows, None, :]
@@ -125,8 +123,7 @@ class BaseRun:
         forcing = np.empty_like(start)
         for key, rows in self.run.groups.items():
             propagator = self.run.propagators[key]
-            forcing[rows] = np.einsum("rs,nsm->nrm", propagator.from_start, start[rows], optimize=True)
-            forcing[rows] += np.einsum("rs,nsm->nrm", propagator.from_end, end[rows], optimize=True)
+            forcing[rows] = propagator.from_start @ start[rows] + propagator.from_end @ end[rows]
         return self.run.tangents(forcing, self.tracks)
 
     def place_temperature(self, place: str) -> Array:

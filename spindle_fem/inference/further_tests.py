@@ -158,7 +158,7 @@ def answer(
         if not changes:
             changes += direction_columns(BaseRun(own, 0, values, fit.candidates), directions)
             if places:
-                changes[1] = np.einsum("pr,grn->gpn", means, changes[1], optimize=True)
+                changes[1] = means @ changes[1]
         amounts = np.array([values[item.coordinate] for item in directions])
         rows = [names.index(item.coordinate) for item in directions]
         for reading, slope, change in zip(readings, slopes, changes, strict=False):

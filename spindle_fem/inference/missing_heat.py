@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 
 # Answers that are marched together, which bounds the memory of one march.
 COLUMNS = 320
+# Parts of the instants that are marched one after the other.
+PARTS = 4
 # An edge of an interval is moved where that gains more than rounding (natural logarithm).
 SMALLEST_SETTLING = 1e-6
 
@@ -239,15 +241,18 @@ def _march(base: BaseRun, patterns: Sequence[Pattern], onsets: Array) -> Array:
         before[:, index], after[:, index] = pattern.strength(base)
     # Share of each step for which heat that begins at an onset is on.
     on = np.clip((drive.grid[1:, None] - onsets) / drive.steps[:, None], 0.0, 1.0)
-    steps, size = len(drive.steps), model.size
-    forcing = np.zeros((steps, size, len(patterns), len(onsets)))
+    answer = np.empty((len(drive.steps), model.size, len(patterns), 1))
     for key, rows in run.groups.items():
         propagator = run.propagators[key]
         start, end = propagator.from_start @ loads, propagator.from_end @ loads
-        answer = start[None] * before[rows, None, :] + end[None] * after[rows, None, :]
-        forcing[rows] = answer[:, :, :, None] * on[rows, None, None, :]
-    tangent = run.tangents(forcing.reshape(steps, size, -1), base.tracks)
-    return base.outputs(tangent)
+        answer[rows, :, :, 0] = start * before[rows, None, :] + end * after[rows, None, :]
+    found = []
+    # Nothing happens before the first instant of each part: its march begins there.
+    for chosen in np.array_split(on, min(PARTS, len(onsets)), axis=1):
+        forcing = (answer * chosen[:, None, None, :]).reshape(*answer.shape[:2], -1)
+        changes = base.outputs(run.tangents(forcing, base.tracks))
+        found.append(changes.reshape(*changes.shape[:2], len(patterns), -1))
+    return np.concatenate(found, axis=3).reshape(*found[0].shape[:2], -1)
 
 
 def explain(onsets: Onsets) -> Explanation:

@@ -297,4 +297,4 @@ def channel_changes(
     """
     owner = np.append(run.drive.step_class, run.drive.step_class[-1])
     outputs = np.array([item.outputs[columns] for item in run.operators])
-    return np.einsum("gcr,grm->gcm", outputs[owner], run.tangents(forcing, tracks), optimize=True)
+    return outputs[owner] @ run.tangents(forcing, tracks)

@@ -369,7 +369,7 @@ class TransientRun:
             at_grid[rows] = states[rows] @ operators.outputs.T + inputs[rows] @ operators.output_inputs.T
             if sensitivities is None:
                 continue
-            by_grid[rows] = np.einsum("or,nrp->nop", operators.outputs, sensitivities[rows], optimize=True)
+            by_grid[rows] = operators.outputs @ sensitivities[rows]
             for column in moving:
                 direct = np.outer(inlet_by[rows, column], operators.output_inputs[:, inlet])
                 by_grid[rows, :, column] += direct
@@ -437,7 +437,11 @@ def _carry(group, given, advance, forcing, start):
     """March columns through linear steps; see :meth:`TransientRun._carried`."""
     steps, size, number = forcing.shape
     found = np.zeros((steps + 1, size, number))
-    for step in range(steps):
+    first = 0
+    if not start.any():
+        while first < steps and not forcing[first].any():
+            first += 1
+    for step in range(first, steps):
         if given[step] >= 0:
             found[step] = start[given[step]]
         np.dot(advance[group[step]], found[step], found[step + 1])

@@ -161,10 +161,10 @@ def sensitivity_forcing(
     second = np.zeros_like(first)
     by_conduction = [i for i, change in enumerate(entered) if change.conduction is not None]
     if by_conduction:
-        # All matrices beside each other: two wide products give what every parameter does in every step.
-        wide = np.stack([entered[i].conduction.T for i in by_conduction], axis=1).reshape(size, -1)
-        first[:, by_conduction] = (-weight * (before + stage) @ wide).reshape(n, -1, size)
-        second[:, by_conduction] = (-weight * after @ wide).reshape(n, -1, size)
+        # All matrices below each other: two wide products give what every parameter does in every step.
+        tall = np.concatenate([entered[i].conduction for i in by_conduction])
+        first[:, by_conduction] = (-weight * (before + stage) @ tall.T).reshape(n, -1, size)
+        second[:, by_conduction] = (-weight * after @ tall.T).reshape(n, -1, size)
     for i, change in enumerate(entered):
         if change.storage is not None:
             first[:, i] += (before - stage) @ change.storage.T
