@@ -172,16 +172,17 @@ def diagnose_recordings(
     effects = catalogue()
     weights = {name: effect.prior_weight for name, effect in effects.items()}
     problem = Problem(small, calibrated.known, calibrated.slow, small.observations)
+    without = problem.fit()
     if directions:
         # Their columns, about the machine as its recordings show it.
-        values = problem.fit().values
-        predictor = with_misdescriptions(predictor, directions, values)
+        predictor = with_misdescriptions(predictor, directions, without.values)
         small = small.misdescribed_like(predictor)
         problem = Problem(small, calibrated.known, calibrated.slow, small.observations)
-    problem = with_inexact_laws(problem, problem.fit())
+        without = problem.fit((), without.values)
+    problem = with_inexact_laws(problem, without)
     clock.lap("reduction")
     search = Search(problem, view, effects, candidates, interval_effects(), weights, progress, workers)
-    found = [replace(h, expected_misfit=h.fit.reduced_misfit) for h in run_search(search)]
+    found = [replace(h, expected_misfit=h.fit.reduced_misfit) for h in run_search(search, without.values)]
     clock.lap("search")
     progress("diagnosis: final fits")
     coarseness = _coarseness(machine.is_network)

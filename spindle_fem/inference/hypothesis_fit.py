@@ -21,8 +21,9 @@ from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.inference import tuned
-from spindle_fem.inference.belief import Belief, Coordinate, Departure
+from spindle_fem.inference.belief import Belief, Coordinate
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, NO_VALUES
+from spindle_fem.inference.fit_objective import Objective, bounded_step
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.predictor import Predictor
@@ -246,7 +247,7 @@ class Problem:
     def cost_at(self, candidates: Sequence[Candidate], start: Mapping[str, float]) -> float:
         """Misfit of a set with its prior at values by name, without fitting any."""
         coordinates, position = self._begun(candidates, start)
-        return _Objective(self, candidates, coordinates).at(position, None).cost
+        return Objective(self, candidates, coordinates).at(position, None).cost
 
     def averaged_misfit(self, fit: Fit) -> float:
         """Minus twice the logarithm of the likelihood of these readings given those of a fit, but a constant.
@@ -254,7 +255,7 @@ class Problem:
         Averaged over all values that the readings of the fit leave possible: what those do not tell must not
         count against a set. To second order about the fit (Laplace's method).
         """
-        objective = _Objective(self, fit.candidates, fit.coordinates)
+        objective = Objective(self, fit.candidates, fit.coordinates)
         point = objective.at(fit.position, None)
         jacobian = objective.slopes(point).jacobian
         rooted = np.sqrt(outlier_weight(point.residual))[:, None] * jacobian
@@ -308,7 +309,7 @@ class Problem:
         coordinates, position = self._begun(candidates, start or {})
         low = np.array([c.low for c in coordinates])
         high = np.array([c.high for c in coordinates])
-        objective = _Objective(self, candidates, coordinates)
+        objective = Objective(self, candidates, coordinates)
         point = objective.at(position, None)
         slopes = objective.slopes(point)
         damping = 1e-3
@@ -318,13 +319,13 @@ class Problem:
             if not exact:
                 enough = tuned.SMALLEST_DECREASE + tuned.SMALLEST_DECREASE_SHARE * point.cost
             if iteration and np.isfinite(hopeless):
-                whole = _bounded_step(hessian, gradient, 0.0, point.position, low, high)
+                whole = bounded_step(hessian, gradient, 0.0, point.position, low, high)
                 promised = float(2.0 * gradient @ whole - whole @ hessian @ whole)
                 if promised > 0.0 and point.cost - tuned.HOPELESS_REACH * promised > hopeless:
                     break
             gain, refused = 0.0, None
             while damping < 1e8:
-                move = _bounded_step(hessian, gradient, damping, point.position, low, high)
+                move = bounded_step(hessian, gradient, damping, point.position, low, high)
                 largest = float(np.abs(move).max()) if move.size else 0.0
                 if largest > LARGEST_MOVE:
                     move *= LARGEST_MOVE / largest
@@ -358,7 +359,7 @@ class Problem:
                 break
             if iteration >= tuned.HOPELESS_AFTER and point.cost - tuned.HOPELESS_REACH * gain > hopeless:
                 break
-            slopes = objective.slopes(point)
+            slopes = objective.slopes(point, None if exact else slopes)
         if not np.isfinite(point.cost):
             raise ConvergenceError("diagnosis", "a hypothesis cannot be simulated at any of its parameters.")
         precision = slopes.curvature(point)
@@ -381,117 +382,3 @@ class Problem:
             point.apart.local(slopes.pulled),
             objective.evaluations,
         )
-
-
-@dataclass(frozen=True, slots=True)
-class _Point:
-    """A hypothesis at one position, and how far that is from what was known."""
-
-    position: Array
-    cost: float
-    residual: Array
-    predicted: list[Prediction]
-    apart: Departure
-
-
-@dataclass(frozen=True, slots=True)
-class _Slopes:
-    """Derivatives of a hypothesis at a point.
-
-    Attributes
-    ----------
-    jacobian : (n, p) ndarray
-        Of the whitened readings.
-    pulled : (m, q) ndarray
-        Of the departures from what was known, by the machine's ``q`` coordinates; the rest has a unit prior.
-    predicted : list of Prediction
-        With derivatives by the coordinates ``bent``, which readings follow along curves.
-    """
-
-    jacobian: Array
-    pulled: Array
-    predicted: list[Prediction]
-    bent: list[int]
-    scale: Array
-
-    def curvature(self, point: _Point) -> Array:
-        """Half the second derivatives of the cost, to first order of the readings, (p, p)."""
-        rooted = np.sqrt(outlier_weight(point.residual))[:, None] * self.jacobian
-        found = rooted.T @ rooted
-        machine = self.pulled.shape[1]
-        found[:machine, :machine] += self.pulled.T @ self.pulled
-        rest = range(machine, len(found))
-        found[rest, rest] += 1.0
-        return found
-
-    def downhill(self, point: _Point) -> Array:
-        """Minus half the gradient of the cost, (p,)."""
-        machine = self.pulled.shape[1]
-        found = self.jacobian.T @ (outlier_weight(point.residual) * point.residual)
-        found[:machine] -= self.pulled.T @ point.apart.residual
-        found[machine:] -= point.position[machine:]
-        return found
-
-    def predicted_after(self, move: Array) -> list[Prediction]:
-        """Predictions after a step to first order."""
-        return [item.moved((self.scale * move)[self.bent]) for item in self.predicted]
-
-
-class _Objective:
-    """Cost of a hypothesis and its derivatives."""
-
-    def __init__(
-        self, problem: Problem, candidates: Sequence[Candidate], coordinates: Sequence[Coordinate]
-    ) -> None:
-        self.problem, self.candidates, self.coordinates = problem, candidates, coordinates
-        self.evaluations = 0
-        self._scale = np.array([c.sigma for c in coordinates])
-        straight = problem.straight(candidates)
-        self._bent = [index for index, c in enumerate(coordinates) if c.name not in straight]
-        self._straight = {i: straight[c.name] for i, c in enumerate(coordinates) if c.name in straight}
-
-    def at(self, position: Array, near: list[Prediction] | None) -> _Point:
-        """The hypothesis at a position; ``near`` are predictions that these begin from."""
-        self.evaluations += 1
-        problem, machine = self.problem, len(self.problem.belief.coordinates)
-        predicted = problem.predict(self.candidates, self.coordinates, position, by=(), near=near)
-        residual = problem.data - problem.whitened([p.temperature for p in predicted])
-        apart = problem.belief.at(position[:machine])
-        added = float(position[machine:] @ position[machine:])
-        cost = float(np.sum(huber(residual))) + apart.cost + added
-        return _Point(position, cost, residual, predicted, apart)
-
-    def slopes(self, point: _Point) -> _Slopes:
-        """Derivatives at a point."""
-        predicted = self.problem.predict(
-            self.candidates, self.coordinates, point.position, by=self._bent, near=point.predicted
-        )
-        jacobian = np.empty((len(self.problem.data), len(self.coordinates)))
-        for index, column in self._straight.items():
-            jacobian[:, index] = self._scale[index] * column
-        jacobian[:, self._bent] = self.problem.whitened([p.sensitivity for p in predicted])
-        return _Slopes(jacobian, point.apart.slopes, predicted, self._bent, self._scale)
-
-
-def _bounded_step(
-    hessian: Array, gradient: Array, damping: float, position: Array, low: Array, high: Array
-) -> Array:
-    """Damped Newton step that stays within bounds: what would leave is held and the rest solved again."""
-    free = np.ones(len(position), dtype=bool)
-    move = np.zeros(len(position))
-    for _ in range(len(position)):
-        rows = np.flatnonzero(free)
-        if rows.size == 0:
-            break
-        matrix = hessian[np.ix_(rows, rows)].copy()
-        matrix[np.diag_indices_from(matrix)] *= 1.0 + damping
-        held = np.flatnonzero(~free)
-        right = gradient[rows] - hessian[np.ix_(rows, held)] @ move[held]
-        move[rows] = np.linalg.solve(matrix, right)
-        target = position + move
-        outside = free & ((target < low) | (target > high))
-        if not outside.any():
-            break
-        move[outside] = np.clip(target, low, high)[outside] - position[outside]
-        free &= ~outside
-    return move

@@ -441,16 +441,15 @@ class Predictor:
         for kind, open_ones in ((JUMP_PREFIX, self._jumps[number]), (GAP_PREFIX, self._hidden[number])):
             names = [f"{kind}{number}.{index}" for index in range(len(open_ones))]
             if any(name in values or name in derivatives for name in names):
-                slopes = self._columns_of(kind, number)
-                if kind == GAP_PREFIX:
-                    predicted.add(names, slopes, values, derivatives)
-                    continue
-                earlier = np.array([values.get(name, 0.0) for name in names])
-                earlier, by = weights_of_earlier(np.array([most for *_, most in open_ones]), earlier)
-                predicted.temperature[:] += np.tensordot(slopes, earlier, 2)
-                if derivatives:
-                    slopes = np.einsum("gcnt,nt->gcn", slopes, by)
-                    predicted.add(names, slopes, NO_VALUES, derivatives)
+                slopes, at = self._columns_of(kind, number), values
+                if kind == JUMP_PREFIX:
+                    earlier = np.array([values.get(name, 0.0) for name in names])
+                    earlier, by = weights_of_earlier(np.array([most for *_, most in open_ones]), earlier)
+                    predicted.temperature[:] += np.tensordot(slopes, earlier, 2)
+                    if not derivatives:
+                        continue
+                    slopes, at = np.einsum("gcnt,nt->gcn", slopes, by), NO_VALUES
+                predicted.add(names, slopes, at, derivatives)
 
     def directions_of(self, number: int) -> tuple[list[str], Array]:
         """Coordinates of directions that do something in a recording, and what they do, (G + 1, c, k) K."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,14 +17,16 @@ from spindle_fem.inference.state_search import add_states, settle_best, simulate
 from spindle_fem.inference.step_search import add_steps
 
 
-def run_search(search: Search) -> list[Hypothesis]:
+def run_search(search: Search, begin: Mapping[str, float]) -> list[Hypothesis]:
     """All hypotheses that were fitted, the most probable first.
+
+    ``begin`` are values that the fit of nothing missing begins from.
 
     A beam search: the most promising additions to the best hypotheses of one
     size are fitted; then sets that differ from the best by one member.
     """
     search.found = {}
-    null = search.problem.fit()
+    null = search.problem.fit((), begin)
     search.keep(Hypothesis(null, float(np.log(tuned.NUMBER_PRIOR[0]))))
     search.progress("diagnosis: screening")
     starts = [(null, *search.screened(null))]

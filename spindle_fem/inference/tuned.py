@@ -86,6 +86,9 @@ SMALLEST_DECREASE, SMALLEST_DECREASE_SHARE = 0.02, 3.0e-4
 # A fit of a hypothesis stops early when it cannot reach the required misfit: after this many steps by this
 # many times the last decrease, or after the first by this many times what the linearised problem promises.
 HOPELESS_AFTER, HOPELESS_REACH = 3, 6.0
+# Where a step changes the readings as its derivatives say, but for this share, the next step uses them again,
+# with what the first one taught; so many steps in a row.
+SLOPES_HOLD, SLOPES_KEPT = 0.2, 1
 # A damped step that differs from a refused one by less than this share is not tried.
 SAME_STEP_WITHIN = 0.05
 

@@ -226,6 +226,7 @@ def test_a_fit_does_not_depend_on_where_it_starts(blank, tmp_path):
 
 
 def test_steps_that_are_refused_cost_no_derivatives_and_are_not_tried_again(blank, tmp_path, monkeypatch):
+    monkeypatch.setattr("spindle_fem.inference.tuned.SLOPES_KEPT", 0)
     predictor = synthetic(blank, tmp_path, 1, TRUTH)
     problem = Problem(predictor, calibrate(None, predictor).belief, QUIET, predictor.observations)
     asked = []
@@ -252,6 +253,7 @@ def test_steps_that_are_refused_cost_no_derivatives_and_are_not_tried_again(blan
 
 
 def test_a_fit_that_cannot_come_near_enough_is_given_up(blank, tmp_path, monkeypatch):
+    monkeypatch.setattr("spindle_fem.inference.tuned.SLOPES_KEPT", 0)
     predictor = synthetic(blank, tmp_path, 1, TRUTH)
     problem = Problem(predictor, calibrate(None, predictor).belief, QUIET, predictor.observations)
     asked = []
@@ -272,6 +274,34 @@ def test_a_fit_that_cannot_come_near_enough_is_given_up(blank, tmp_path, monkeyp
     asked.clear()
     problem.fit((), start, hopeless=-1e9)
     assert asked.count(True) == 2 < steps
+
+
+def test_derivatives_that_hold_are_used_again(blank, tmp_path, monkeypatch):
+    predictor = synthetic(blank, tmp_path, 1, TRUTH)
+    problem = Problem(predictor, calibrate(None, predictor).belief, QUIET, predictor.observations)
+    asked = []
+    plain = Problem.predict
+
+    def predict(self, candidates, coordinates, position, *, by=None, near=None):
+        asked.append(by != ())
+        return plain(self, candidates, coordinates, position, by=by, near=near)
+
+    monkeypatch.setattr(Problem, "predict", predict)
+    start = {name: 1.0 / value for name, value in TRUTH.items()}
+
+    def fitted(kept, **told):
+        monkeypatch.setattr("spindle_fem.inference.tuned.SLOPES_KEPT", kept)
+        asked.clear()
+        return problem.fit((), start, **told), asked.count(True)
+
+    (every, steps), (some, fewer) = fitted(0), fitted(1)
+    assert fewer <= 0.75 * steps
+    assert abs(some.misfit_with_prior - every.misfit_with_prior) < 0.1
+    assert np.abs(some.position - every.position).max() < 0.1
+    assert some.log_evidence == pytest.approx(every.log_evidence, abs=0.1)
+    (exact, steps), (same, as_many) = fitted(0, exact=True), fitted(1, exact=True)
+    assert steps == as_many
+    assert np.array_equal(exact.position, same.position)
 
 
 def test_a_prediction_without_derivatives_is_the_same(blank):

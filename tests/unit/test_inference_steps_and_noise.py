@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from spindle_fem.inference.belief import Coordinate
-from spindle_fem.inference.hypothesis_fit import _bounded_step
+from spindle_fem.inference.fit_objective import bounded_step
 from spindle_fem.inference.reading_noise import ChannelBins, SlowError, Whitener, likely_slow_error
 from spindle_fem.inference.robust_size import huber
 
@@ -28,7 +28,7 @@ def test_a_bounded_step_is_the_least_squares_step_within_the_bounds(seed):
     jacobian, _ = np.linalg.qr(jacobian)
     position = generator.uniform(-0.5, 0.5, 4)
     low, high = np.full(4, -0.8), np.array([0.8, np.inf, 0.6, np.inf])
-    move = _bounded_step(jacobian.T @ jacobian, jacobian.T @ residual, 0.0, position, low, high)
+    move = bounded_step(jacobian.T @ jacobian, jacobian.T @ residual, 0.0, position, low, high)
     exact = lsq_linear(jacobian, residual, bounds=(low - position, high - position), tol=1e-14).x
     assert position + move == pytest.approx(np.clip(position + move, low, high), abs=1e-15)
     assert move == pytest.approx(exact, abs=1e-6)
@@ -39,9 +39,9 @@ def test_an_unbounded_step_is_newtons():
     root, gradient = generator.normal(size=(5, 3)), generator.normal(size=3)
     hessian = root.T @ root
     free = np.full(3, np.inf)
-    move = _bounded_step(hessian, gradient, 0.0, np.zeros(3), -free, free)
+    move = bounded_step(hessian, gradient, 0.0, np.zeros(3), -free, free)
     assert hessian @ move == pytest.approx(gradient)
-    damped = _bounded_step(hessian, gradient, 10.0, np.zeros(3), -free, free)
+    damped = bounded_step(hessian, gradient, 10.0, np.zeros(3), -free, free)
     assert (hessian + 10.0 * np.diag(np.diag(hessian))) @ damped == pytest.approx(gradient)
 
 
