@@ -48,7 +48,7 @@ def run_search(search: Search, begin: Mapping[str, float]) -> list[Hypothesis]:
     is_network = search.problem.predictor.is_network
     if is_network:
         _what_changes(search, starts[-1][0])
-        _second_state(search)
+        _second_event(search)
     if not search.is_explained(search.ranked()[0]):
         search.progress("diagnosis: 2 effects")
         for fit, screened, intervals in reversed(starts):
@@ -128,9 +128,9 @@ def _levels_beside(search: Search) -> None:
     Sought in what the others leave as they are: fitted without it they take up half of what it does.
     """
     fit = search.ranked()[0].fit
-    events = [c for c in fit.candidates if search.in_intervals(c)]
-    if len(fit.candidates) > 1 and len(events) == 1 and not search.is_hidden_state(events[0]):
-        about = simulated(search, *without(fit, events[0]), iterations=0)
+    levels = [c for c in fit.candidates if search.in_intervals(c) and not search.is_hidden_state(c)]
+    if len(fit.candidates) > 1 and len(levels) == 1:
+        about = simulated(search, *without(fit, levels[0]), iterations=0)
         if about is not None:
             add_steps(search, about)
 
@@ -146,10 +146,10 @@ def _beside(search: Search) -> None:
         if not 0 < len(best.keys) < LARGEST_SET or _leaves_little(search, best):
             return
         search.progress("diagnosis: beside the best set")
-        if not any(search.is_hidden_state(c) for c in best.fit.candidates):
+        if any(map(search.in_intervals, best.fit.candidates)):
+            _another_event(search, best.fit)
+        if not any(map(search.is_hidden_state, best.fit.candidates)):
             _what_changes(search, laws_with_room(search))
-        else:
-            add_states(search, best.fit, 1)
         screened, intervals = search.screened(best.fit)
         search.extend(best.fit, screened, intervals, 1, tuned.ADDITIONS)
         settle_best(search)
@@ -160,19 +160,28 @@ def _beside(search: Search) -> None:
         best = again
 
 
-def _second_state(search: Search) -> None:
-    """Look for another state beside the best one, before laws take up what it does, and for one beside laws.
+def _second_event(search: Search) -> None:
+    """Look for what else switches or changes its level beside the best set, before laws take up what it does.
 
-    The course of a state that was found alone has taken up what a law at its place does.
+    Also for a state beside laws: the course of one that was found alone has taken up what a law at its place
+    does.
     """
     best = search.ranked()[0]
-    places = {c.component for c in best.fit.candidates if search.is_hidden_state(c)}
-    if places and not _leaves_little(search, best):
-        laws = [h.fit for h in _different(search, search.ranked()) if h.keys and _only_laws(search, h)]
-        there = [fit for fit in laws if places & {c.component for c in fit.candidates}]
-        add_states(search, best.fit, 1)
-        for fit in there[: tuned.LAWS_BESIDE_A_STATE]:
-            add_states(search, fit, 1)
+    events = [c for c in best.fit.candidates if search.in_intervals(c)]
+    if not events or _leaves_little(search, best):
+        return
+    laws = [h.fit for h in _different(search, search.ranked()) if h.keys and _only_laws(search, h)]
+    places = {c.component for c in events if search.is_hidden_state(c)}
+    there = [fit for fit in laws if places & {c.component for c in fit.candidates}]
+    _another_event(search, best.fit)
+    for fit in there[: tuned.LAWS_BESIDE_A_STATE]:
+        add_states(search, fit, 1)
+
+
+def _another_event(search: Search, fit: Fit) -> None:
+    """Sets with one more state, or changes of level, than a fit has."""
+    add_states(search, fit, 1)
+    add_steps(search, fit)
 
 
 def _leaves_little(search: Search, best: Hypothesis) -> bool:

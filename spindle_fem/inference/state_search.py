@@ -74,11 +74,9 @@ def state_places(search: Search) -> list[StatePlace]:
 def add_states(search: Search, fit: Fit, number: int = tuned.STATE_PLACES) -> None:
     """Fit the sets with a state beside what a fit holds, at the most promising places.
 
-    Beside one state another may switch, elsewhere or by another effect; not beside intervals or levels, which
-    are the same thing in other words.
+    Beside what switches or changes its level already another may, elsewhere or by another effect.
     """
-    events = [c for c in fit.candidates if search.in_intervals(c)]
-    if len(events) > 1 or not all(search.is_hidden_state(c) for c in events):
+    if sum(map(search.in_intervals, fit.candidates)) > 1:
         return
     problem = search.problem
     recordings = range(len(problem.predictor.recordings))

@@ -63,12 +63,19 @@ class StepPlace:
 
 
 def add_steps(search: Search, fit: Fit) -> None:
-    """Fit the sets with changes of level beside what a fit holds, at the most promising places."""
-    if any(search.in_intervals(c) for c in fit.candidates):
+    """Fit the sets with changes of level beside what a fit holds, at the most promising places.
+
+    Beside what switches or changes its level already another may, elsewhere or by another effect.
+    """
+    if sum(map(search.in_intervals, fit.candidates)) > 1:
         return
     predictor = search.problem.predictor
     found = []
-    patterns = search.patterns(levels=True)
+    patterns = [
+        (effect, pattern)
+        for effect, pattern in search.patterns(levels=True)
+        if (effect.name, search.view.component(pattern.spot)) not in fit.keys
+    ]
     for recording in range(len(predictor.recordings)):
         answers = onset_answers(
             search.problem,

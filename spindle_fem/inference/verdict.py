@@ -383,7 +383,7 @@ def _predicts(
         return True
     if coarseness > 1.0 and max(left(empty.fit), beyond(empty.fit)) > 1.0:
         lower = beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
-        return lower and left(chosen.fit) <= left(empty.fit)
+        return lower and left(chosen.fit) <= (1.0 + tuned.LEAST_IMPROVEMENT) * left(empty.fit)
     gain = _heldout_gain(chosen, empty)
     if coarseness > 1.0:
         return gain >= tuned.LEAST_HELDOUT_GAIN

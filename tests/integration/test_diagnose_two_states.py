@@ -109,3 +109,25 @@ def test_heat_that_switches_is_told_beside_a_share_that_is_off_at_the_same_node(
         ("heat_scale", "bearing"),
     }
     assert found["unrecorded_heat_source"]["parameters"]["heat"]["value"] == pytest.approx(HEAT, rel=0.1)
+
+
+@pytest.mark.slow
+def test_cooling_that_changes_its_level_is_told_beside_heat_that_switches(monkeypatch, tmp_path):
+    heated = course(np.random.default_rng(5), 500.0, 1500.0, 1500.0)
+    monkeypatch.setattr(flawed_network, "PROGRAMME", POWERS)
+    monkeypatch.setattr(flawed_network, "temperatures", switching(heated, ((9000.0, 19800.0),)))
+    run = record(tmp_path / "run", 3, times=np.arange(0.0, STOP + 1.0, 60.0))
+    machine = tmp_path / "machine.toml"
+    machine.write_text(MACHINE)
+    content = diagnose_without_report(machine, [run], tmp_path / "out")
+    found = {item["effect"]: item for item in content["findings"]}
+    assert {(name, item["component"]) for name, item in found.items()} == {
+        ("unrecorded_heat_source", "bearing"),
+        ("unrecorded_cooling", "body|ambient"),
+    }
+    assert found["unrecorded_heat_source"]["parameters"]["heat"]["value"] == pytest.approx(HEAT, rel=0.1)
+    (interval,) = found["unrecorded_cooling"]["intervals"]
+    assert interval["start"] == pytest.approx(9000.0, abs=120.0)
+    assert interval["end"] == pytest.approx(19800.0, abs=120.0)
+    more = (MORE - 1.0) * as_built(3)["body|ambient"]
+    assert interval["value"] == pytest.approx(more, rel=0.1)

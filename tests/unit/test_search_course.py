@@ -28,6 +28,8 @@ class Ever:
     def is_hidden_state(self, candidate):
         return True
 
+    in_intervals = is_hidden_state
+
     def screened(self, fit):
         self.rounds += 1
         return None, {}
@@ -42,9 +44,12 @@ class Ever:
 def test_a_state_that_gains_a_little_every_time_is_not_followed_for_ever(monkeypatch, gain, rounds):
     monkeypatch.setattr(search_course, "settle_best", lambda search: None)
     monkeypatch.setattr(search_course, "add_states", lambda search, fit, number: None)
+    asked = []
+    monkeypatch.setattr(search_course, "add_steps", lambda search, fit: asked.append(fit.candidates))
     search = Ever(gain)
     search_course._beside(search)
     assert search.rounds == rounds
+    assert asked == [("state",)] * rounds
 
 
 def test_what_changes_is_sought_beside_the_best_laws_that_leave_room_for_it():
