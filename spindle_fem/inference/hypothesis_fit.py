@@ -280,6 +280,18 @@ class Problem:
                 position[index] = coordinate.of(start[coordinate.name])
         return coordinates, np.clip(position, [c.low for c in coordinates], [c.high for c in coordinates])
 
+    def simulated(
+        self,
+        candidates: Sequence[Candidate],
+        start: Mapping[str, float],
+        iterations: int = MOST_ITERATIONS,
+    ) -> Fit | None:
+        """A fit; None where the set cannot be simulated from there."""
+        try:
+            return self.fit(candidates, start, iterations=iterations)
+        except NOT_SIMULATED:
+            return None
+
     def fit(
         self,
         candidates: Sequence[Candidate] = (),

@@ -150,8 +150,10 @@ def at_other_spots(
     At most ``of_each`` of heat and of loss, and ``tuned.OTHER_SPOTS`` in all.
     """
     kept = {name: value for name, value in fit.values.items() if name not in member.parameters}
-    left = search.problem.fit(rest, kept, iterations=0)
+    left = search.problem.simulated(rest, kept, iterations=0)
     tasks: list[Task] = []
+    if left is None:  # without the member, its others run away
+        return tasks
     for found, candidate in search.interval_candidates(left):
         if len(tasks) == tuned.OTHER_SPOTS:
             break
@@ -178,7 +180,9 @@ def _other_intervals(search: Search, fit: Fit, event: Candidate) -> tuple[Fit, O
     alone = replace(search, workers=Workers())
     rest = tuple(c for c in fit.candidates if c is not event)
     known = search.found.get(identity(rest))
-    left = search.problem.fit(rest, fit.values) if known is None else known.fit
+    left = search.problem.simulated(rest, fit.values) if known is None else known.fit
+    if left is None:
+        return None
     own = search.effects[event.effect].intervals(event, fit.values)
     for found, candidate in alone.interval_candidates(left, like=event):
         if candidate.form == event.form:

@@ -13,7 +13,7 @@ from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search, Task
 from spindle_fem.inference.input_sampling import left_over_noise
 from spindle_fem.inference.neighbouring_sets import exchanged, reduced, sought_again, widened
-from spindle_fem.inference.state_search import add_states, settle_best, simulated
+from spindle_fem.inference.state_search import add_states, settle_best
 from spindle_fem.inference.step_search import add_steps
 
 
@@ -130,7 +130,7 @@ def _levels_beside(search: Search) -> None:
     fit = search.ranked()[0].fit
     levels = [c for c in fit.candidates if search.in_intervals(c) and not search.is_hidden_state(c)]
     if len(fit.candidates) > 1 and len(levels) == 1:
-        about = simulated(search, *without(fit, levels[0]), iterations=0)
+        about = search.problem.simulated(*without(fit, levels[0]), iterations=0)
         if about is not None:
             add_steps(search, about)
 

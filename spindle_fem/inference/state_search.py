@@ -8,7 +8,7 @@ course is its likelihood over that of all courses under the fitted chain.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from spindle_fem.inference.hidden_states import (
     without,
 )
 from spindle_fem.inference.hypothesis import Hypothesis, identity
-from spindle_fem.inference.hypothesis_fit import MOST_ITERATIONS, NOT_SIMULATED, Fit, Problem, amplitude_name
+from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem, amplitude_name
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
@@ -245,25 +245,12 @@ def _settle_again(search: Search, fit: Fit, candidate: Candidate) -> None:
     settle(search, fit, place, again, candidate)
     for other in fit.candidates:
         if other is not candidate:
-            begun = simulated(search, *without(fit, other))
+            begun = search.problem.simulated(*without(fit, other))
             if begun is not None:
                 settle(search, begun, place, again, candidate)
     twin = _twin(search, fit, place, candidate, tuned.FAIR_SHARE * again.log_evidence)
     if twin is not None:
         settle(search, fit, *twin, candidate)
-
-
-def simulated(
-    search: Search,
-    candidates: tuple[Candidate, ...],
-    values: Mapping[str, float],
-    iterations: int = MOST_ITERATIONS,
-) -> Fit | None:
-    """A fit; None where the set cannot be simulated."""
-    try:
-        return search.problem.fit(candidates, values, iterations=iterations)
-    except NOT_SIMULATED:
-        return None
 
 
 def _about(
@@ -347,7 +334,7 @@ def settle(
         candidate = _candidate(search, place, intervals, course)
         factor = values.get(candidate.sized_by, 1.0)
         start = values | {amplitude_name(candidate): course.size / factor}
-        fitted = simulated(search, (*rest, candidate), start)
+        fitted = search.problem.simulated((*rest, candidate), start)
         if fitted is None:
             return
         paid = course.log_choice + len(course.chain.begin) * float(np.log(len(course.on)))

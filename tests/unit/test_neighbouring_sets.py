@@ -9,10 +9,12 @@ import pytest
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.errors import ConvergenceError
 from spindle_fem.inference.candidate_response import Variant
 from spindle_fem.inference.hypothesis import identity
+from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.hypothesis_search import Search
-from spindle_fem.inference.neighbouring_sets import exchanged
+from spindle_fem.inference.neighbouring_sets import at_other_spots, exchanged
 from spindle_fem.inference.screening import Screened
 
 
@@ -121,3 +123,15 @@ def test_a_known_set_is_fitted_again_where_it_begins_with_less(search, left, aga
 def test_a_known_set_is_fitted_anew_and_what_ends_better_is_kept(search, left, kept):
     search.fit_all([((BESIDE,), {"left": left})], anew=True)
     assert ("kept" in search.found) is kept
+
+
+def test_other_spots_are_not_sought_where_a_set_without_the_member_runs_away(monkeypatch):
+    """A bypass may hold what closing bearings heat in check: without it nothing can be simulated."""
+
+    def runs_away(self, *given, **more):
+        raise ConvergenceError("t = 4600 s", "the terms run away to 5365 K.")
+
+    monkeypatch.setattr(Problem, "fit", runs_away)
+    search = SimpleNamespace(problem=object.__new__(Problem))
+    fit = SimpleNamespace(values={"heat": 1.0})
+    assert at_other_spots(search, fit, BESIDE, (HUMP,)) == []
