@@ -133,6 +133,33 @@ def with_simpler_first(ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], flo
     return list(ranked)
 
 
+def without_repeats(ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], float]) -> list[Ranked]:
+    """Sets without those whose law only repeats that of another, which gets their probability.
+
+    A gap that closes with temperature is a contact that conducts less at an end of its values. Where both
+    read the same within a tenth of the noise they say the same, one of them with fewer values.
+    """
+    left = {id(item): item.probability for item in ranked}
+    for item in ranked:
+        simpler = [
+            other
+            for other in ranked
+            if id(other) in left
+            and _repeats(item.fit, other.fit)
+            and apart(item.fit, other.fit) < tuned.SAME_READINGS
+        ]
+        if simpler:
+            left[id(simpler[0])] += left.pop(id(item))
+    found = [replace(item, probability=left[id(item)]) for item in ranked if id(item) in left]
+    return sorted(found, key=lambda item: -item.probability)
+
+
+def _repeats(fit: Fit, other: Fit) -> bool:
+    """Whether a set is another but for one effect, whose law can be that of the other at its place."""
+    own, theirs = fit.named_keys - other.named_keys, other.named_keys - fit.named_keys
+    return len(own) == 1 and theirs == {(effect_of(effect).repeats, place) for effect, place in own}
+
+
 def as_one(
     ranked: Sequence[Ranked], overlapping: Mapping[str, frozenset[str]]
 ) -> tuple[Ranked, list[Ranked]]:

@@ -24,6 +24,7 @@ from spindle_fem.inference.like_sets import (
     may_stand_for,
     with_needed_thirds,
     with_simpler_first,
+    without_repeats,
 )
 from spindle_fem.inference.p_value import detection_p_value, heldout_p_value
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
@@ -248,6 +249,7 @@ def judge(
     by_all = {item.fit.named_keys: item.probability for item in ranked}
     if coarseness == 1.0:
         ranked = with_needed_thirds(ranked)
+    ranked = without_repeats(ranked, apart)
     ranked = with_simpler_first(likeliest_first(ranked, overlapping or {}), apart)
     chosen = ranked[0]
     if tuned.RULED_OUT <= p_value <= tuned.SIGNIFICANT:

@@ -172,3 +172,23 @@ def test_heat_of_one_law_at_two_spots_is_one_set_named_at_the_larger():
     other = fitted(large, (replace(small[0], form="SP04 following load"), 0.1))
     assert len(other.named) == 2
     assert not are_alike(one, other, {})
+
+
+def test_a_law_that_only_repeats_a_constant_one_at_its_place_is_no_rival():
+    joint = candidate("joint_conductance", "a|b", kind="parameter")
+    nothing, constant = hypothesis(misfit=1400.0), hypothesis(joint, CHURNING, misfit=401.0)
+
+    def found(place, distance):
+        rich = hypothesis(candidate("gap_closure", place), CHURNING, misfit=400.0)
+        near = distance * tuned.SAME_READINGS
+        return rich, verdict(nothing, rich, constant, calibrated=True, apart=lambda *_: near)
+
+    _, alike = found("a|b", 0.9)
+    assert alike.chosen.fit is constant.fit
+    assert alike.verdict == "missing_physics"
+    assert alike.evidence > 0.99
+    assert not alike.alternatives
+    for place, distance in (("a|b", 1.1), ("b|c", 0.9)):
+        rich, apart = found(place, distance)
+        assert apart.verdict == "ambiguous"
+        assert {id(i.fit) for i in (apart.chosen, *apart.alternatives)} == {id(rich.fit), id(constant.fit)}

@@ -90,6 +90,7 @@ class GapClosure(Effect):
 
     name = "gap_closure"
     kind = "missing_physics"
+    repeats = "joint_conductance"
     title = "the loose outer-ring seats conduct better as the rings expand into the bores"
     check = (
         "Outer-ring fits and bore roundness: measure clearance cold; look for fretting rust; compare ring "

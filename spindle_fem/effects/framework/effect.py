@@ -247,6 +247,8 @@ class Effect(ABC):
         final fits then begin from every start.
     delays : bool
         Whether its amplitude is a time by which a channel is late, as that of every sensor is by a little.
+    repeats : str
+        Effect that its law is, at the same place, at an end of its values; empty for none.
     """
 
     name: str
@@ -259,6 +261,7 @@ class Effect(ABC):
     law_shift: Mapping[str, float] = MappingProxyType({})
     starts_are_answers: bool = False
     delays: bool = False
+    repeats: str = ""
 
     def in_definition(self, spec: MachineSpec) -> bool:
         """Whether the definition of a machine with geometry switches it on without an ``[[effect]]``."""
