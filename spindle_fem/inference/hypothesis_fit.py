@@ -366,8 +366,10 @@ class Problem:
                 refused = move
                 damping *= 10.0
             # A step that was taken gains more than nothing. The last one gains so little that the derivatives
-            # before it serve.
+            # before it serve, if they are none of an earlier step: they say how certain all values are.
             if gain <= enough:
+                if slopes.kept:
+                    slopes = objective.slopes(point)
                 break
             if iteration >= tuned.HOPELESS_AFTER and point.cost - tuned.HOPELESS_REACH * gain > hopeless:
                 break
