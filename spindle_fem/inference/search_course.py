@@ -147,7 +147,9 @@ def _beside(search: Search) -> None:
             return
         search.progress("diagnosis: beside the best set")
         if any(map(search.in_intervals, best.fit.candidates)):
-            _another_event(search, best.fit)
+            add_states(search, best.fit, 1)
+            # Levels fit much of what laws do: beside a state they come after those.
+            add_steps(search, best.fit)
         if not any(map(search.is_hidden_state, best.fit.candidates)):
             _what_changes(search, laws_with_room(search))
         screened, intervals = search.screened(best.fit)
@@ -161,7 +163,7 @@ def _beside(search: Search) -> None:
 
 
 def _second_event(search: Search) -> None:
-    """Look for what else switches or changes its level beside the best set, before laws take up what it does.
+    """Look for what switches beside a state, or changes of level, before laws take up what it does.
 
     Also for a state beside laws: the course of one that was found alone has taken up what a law at its place
     does.
@@ -173,15 +175,9 @@ def _second_event(search: Search) -> None:
     laws = [h.fit for h in _different(search, search.ranked()) if h.keys and _only_laws(search, h)]
     places = {c.component for c in events if search.is_hidden_state(c)}
     there = [fit for fit in laws if places & {c.component for c in fit.candidates}]
-    _another_event(search, best.fit)
+    add_states(search, best.fit, 1)
     for fit in there[: tuned.LAWS_BESIDE_A_STATE]:
         add_states(search, fit, 1)
-
-
-def _another_event(search: Search, fit: Fit) -> None:
-    """Sets with one more state, or changes of level, than a fit has."""
-    add_states(search, fit, 1)
-    add_steps(search, fit)
 
 
 def _leaves_little(search: Search, best: Hypothesis) -> bool:
