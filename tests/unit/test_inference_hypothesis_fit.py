@@ -252,10 +252,8 @@ def test_steps_that_are_refused_cost_no_derivatives_and_are_not_tried_again(blan
         assert np.abs(first - second).max() > 0.04 * np.abs(first).max()
 
 
-def test_a_fit_that_cannot_come_near_enough_is_given_up(blank, tmp_path, monkeypatch):
-    monkeypatch.setattr("spindle_fem.inference.tuned.SLOPES_KEPT", 0)
-    predictor = synthetic(blank, tmp_path, 1, TRUTH)
-    problem = Problem(predictor, calibrate(None, predictor).belief, QUIET, predictor.observations)
+def predictions_noted(monkeypatch):
+    """Whether each prediction that is made from now on has derivatives."""
     asked = []
     plain = Problem.predict
 
@@ -264,6 +262,14 @@ def test_a_fit_that_cannot_come_near_enough_is_given_up(blank, tmp_path, monkeyp
         return plain(self, candidates, coordinates, position, by=by, near=near)
 
     monkeypatch.setattr(Problem, "predict", predict)
+    return asked
+
+
+def test_a_fit_that_cannot_come_near_enough_is_given_up(blank, tmp_path, monkeypatch):
+    monkeypatch.setattr("spindle_fem.inference.tuned.SLOPES_KEPT", 0)
+    predictor = synthetic(blank, tmp_path, 1, TRUTH)
+    problem = Problem(predictor, calibrate(None, predictor).belief, QUIET, predictor.observations)
+    asked = predictions_noted(monkeypatch)
     start = {name: 1.0 / value for name, value in TRUTH.items()}
     whole = problem.fit((), start)
     steps = asked.count(True)
@@ -279,14 +285,7 @@ def test_a_fit_that_cannot_come_near_enough_is_given_up(blank, tmp_path, monkeyp
 def test_derivatives_that_hold_are_used_again(blank, tmp_path, monkeypatch):
     predictor = synthetic(blank, tmp_path, 1, TRUTH)
     problem = Problem(predictor, calibrate(None, predictor).belief, QUIET, predictor.observations)
-    asked = []
-    plain = Problem.predict
-
-    def predict(self, candidates, coordinates, position, *, by=None, near=None):
-        asked.append(by != ())
-        return plain(self, candidates, coordinates, position, by=by, near=near)
-
-    monkeypatch.setattr(Problem, "predict", predict)
+    asked = predictions_noted(monkeypatch)
     start = {name: 1.0 / value for name, value in TRUTH.items()}
 
     def fitted(kept, **told):
