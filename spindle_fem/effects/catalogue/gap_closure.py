@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from spindle_fem.effects.catalogue.joint_conductance import JointConductance
 from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words, quantity
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, relaxed, rows, shape, smooth_step
@@ -90,7 +91,7 @@ class GapClosure(Effect):
 
     name = "gap_closure"
     kind = "missing_physics"
-    repeats = "joint_conductance"
+    repeats = JointConductance.name
     title = "the loose outer-ring seats conduct better as the rings expand into the bores"
     check = (
         "Outer-ring fits and bore roundness: measure clearance cold; look for fretting rust; compare ring "
