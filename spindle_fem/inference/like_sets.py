@@ -10,7 +10,7 @@ import numpy as np
 from spindle_fem.effects.framework.effect import IntervalEffect, in_intervals
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
-from spindle_fem.inference.hypothesis import Ranked
+from spindle_fem.inference.hypothesis import Hypothesis, Ranked
 from spindle_fem.inference.hypothesis_fit import Fit
 
 
@@ -29,6 +29,12 @@ def may_stand_for(fit: Fit, other: Fit, overlapping: Mapping[str, frozenset[str]
 def free_in_time(fit: Fit) -> int:
     """Number of effects of a set that are on in intervals."""
     return sum(in_intervals(effect_of(c.effect), c) for c in fit.candidates)
+
+
+def states_alone(fit: Fit) -> bool:
+    """Whether all that is on in intervals is a hidden state, whose size alone is free."""
+    events = [c for c in fit.candidates if in_intervals(effect_of(c.effect), c)]
+    return all(c.free.keys() == {c.amplitude} for c in events)
 
 
 def leaves_unnamed(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
@@ -112,32 +118,12 @@ def likeliest_first(ranked: Sequence[Ranked], overlapping: Mapping[str, frozense
     return [front, *(item for item in ranked if item is not front)]
 
 
-def with_simpler_first(ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], float]) -> list[Ranked]:
-    """Sets, the first in the place of one of as many effects that reads alike with fewer free values.
-
-    Between readings a tenth of the noise apart chance decides: a law that follows temperature repeats a
-    constant one, with a few values more to fit the noise by.
-    """
-    first, *others = ranked
-    for place, item in enumerate(others, 1):
-        alike = item.probability >= tuned.LISTED and len(item.fit.named_keys) == len(first.fit.named_keys)
-        fewer = len(item.fit.coordinates) < len(first.fit.coordinates)
-        if alike and fewer and apart(first.fit, item.fit) < tuned.SAME_READINGS:
-            simpler = replace(item, probability=first.probability)
-            return [
-                simpler,
-                *others[: place - 1],
-                replace(first, probability=item.probability),
-                *others[place:],
-            ]
-    return list(ranked)
-
-
 def without_repeats(ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], float]) -> list[Ranked]:
     """Sets without those whose law only repeats that of another, which gets their probability.
 
     A gap that closes with temperature is a contact that conducts less at an end of its values. Where both
-    read the same within a tenth of the noise they say the same, one of them with fewer values.
+    read the same within a tenth of the noise, or the gap makes the readings no likelier, they say the same,
+    one of them with fewer values.
     """
     left = {id(item): item.probability for item in ranked}
     for item in ranked:
@@ -146,12 +132,20 @@ def without_repeats(ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], float]
             for other in ranked
             if id(other) in left
             and _repeats(item.fit, other.fit)
-            and apart(item.fit, other.fit) < tuned.SAME_READINGS
+            and (apart(item.fit, other.fit) < tuned.SAME_READINGS or not _tells_more(item.best, other.best))
         ]
         if simpler:
             left[id(simpler[0])] += left.pop(id(item))
     found = [replace(item, probability=left[id(item)]) for item in ranked if id(item) in left]
     return sorted(found, key=lambda item: -item.probability)
+
+
+def _tells_more(one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether a set makes the readings, fitted and held out, likelier than another."""
+    gain = other.misfit - one.misfit
+    if one.heldout is not None and other.heldout is not None:
+        gain += other.heldout - one.heldout
+    return gain > 0.0
 
 
 def _repeats(fit: Fit, other: Fit) -> bool:

@@ -23,7 +23,6 @@ from spindle_fem.inference.like_sets import (
     likeliest_first,
     may_stand_for,
     with_needed_thirds,
-    with_simpler_first,
     without_repeats,
 )
 from spindle_fem.inference.p_value import detection_p_value, heldout_p_value
@@ -249,8 +248,7 @@ def judge(
     by_all = {item.fit.named_keys: item.probability for item in ranked}
     if coarseness == 1.0:
         ranked = with_needed_thirds(ranked)
-    ranked = without_repeats(ranked, apart)
-    ranked = with_simpler_first(likeliest_first(ranked, overlapping or {}), apart)
+    ranked = likeliest_first(without_repeats(ranked, apart), overlapping or {})
     chosen = ranked[0]
     if tuned.RULED_OUT <= p_value <= tuned.SIGNIFICANT:
         nothing = min(empty.probability, tuned.STILL_POSSIBLE)

@@ -65,24 +65,6 @@ def test_a_third_that_held_out_readings_doubt_is_listed_where_it_is_likely_other
         assert all(i.probability < 0.02 for i in found.alternatives)
 
 
-def test_of_sets_that_read_alike_the_one_with_fewer_free_values_is_named():
-    """What the richer one gains within a tenth of the noise is chance, and counts for the simpler one."""
-    nothing, simple = hypothesis(misfit=1400.0), hypothesis(CHURNING, misfit=402.0)
-    rich = hypothesis(PRELOAD, misfit=400.0)
-    more = replace(rich.fit.coordinates[-1], name="thermal_preload.exponent")
-    fit = replace(rich.fit, coordinates=(*rich.fit.coordinates, more), position=np.zeros(3))
-    rich = replace(rich, fit=replace(fit, covariance=np.eye(3)))
-    first = {item.fit.keys: item.probability for item in rank([nothing, rich, simple], 1.0)}
-    assert first[rich.keys] > first[simple.keys] > tuned.LISTED
-    for distance, chosen, other in ((0.9, simple, rich), (1.1, rich, simple)):
-        found = verdict(
-            nothing, rich, simple, calibrated=True, apart=lambda *_, d=distance: d * tuned.SAME_READINGS
-        )
-        assert found.chosen.fit.keys == chosen.keys
-        assert [item.fit.keys for item in found.alternatives] == [other.keys]
-        assert found.chosen.probability > found.alternatives[0].probability
-
-
 def test_what_is_likelier_at_places_that_count_as_one_is_named_first():
     """Split between a bearing and its set it is behind another effect, together ahead of it."""
     group = dict.fromkeys(("front_bearings", "F1"), frozenset({"F1", "front_bearings"}))
@@ -178,8 +160,8 @@ def test_a_law_that_only_repeats_a_constant_one_at_its_place_is_no_rival():
     joint = candidate("joint_conductance", "a|b", kind="parameter")
     nothing, constant = hypothesis(misfit=1400.0), hypothesis(joint, CHURNING, misfit=401.0)
 
-    def found(place, distance):
-        rich = hypothesis(candidate("gap_closure", place), CHURNING, misfit=400.0)
+    def found(place, distance, misfit=400.0):
+        rich = hypothesis(candidate("gap_closure", place), CHURNING, misfit=misfit)
         near = distance * tuned.SAME_READINGS
         return rich, verdict(nothing, rich, constant, calibrated=True, apart=lambda *_: near)
 
@@ -188,6 +170,9 @@ def test_a_law_that_only_repeats_a_constant_one_at_its_place_is_no_rival():
     assert alike.verdict == "missing_physics"
     assert alike.evidence > 0.99
     assert not alike.alternatives
+    # Readings are no likelier with what it may do beyond, however it reads.
+    _, no_likelier = found("a|b", 1.1, misfit=401.0)
+    assert no_likelier.chosen.fit is constant.fit
     for place, distance in (("a|b", 1.1), ("b|c", 0.9)):
         rich, apart = found(place, distance)
         assert apart.verdict == "ambiguous"
