@@ -30,7 +30,7 @@ from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem, am
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
-from spindle_fem.inference.missing_heat import Pattern
+from spindle_fem.inference.missing_heat import Pattern, stretches
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.switching_model import QUICK, THOROUGH, Chain, Course, ReadingFilter, find_course
 from spindle_fem.recordings.align import Recording
@@ -41,6 +41,9 @@ Array = NDArray[np.float64]
 START_SIZES = (0.3, 1.5)
 # Fewer intervals than this are single events, whose edges are free.
 FEWEST = 4
+# Intervals from which on they are followed in held-out stretches like a state, where their sizes differ by no
+# more than this factor.
+SEVERAL, ONE_SIZE = 2, 1.5
 # Rounds in which several states are inferred in turn.
 SEVERAL_ROUNDS = 2
 # Width of a state's edges over the steps of a fit, from which means over steps are right to 0.3 %: the
@@ -142,9 +145,14 @@ def inferred_states(
 ) -> dict[str, InferredState]:
     """Every hidden state of a fit inferred from all readings, by the name of its amplitude.
 
-    On the steps of the problem, which may be others than those of the search.
+    On the steps of the problem, which may be others than those of the search. Likewise what is on in several
+    intervals at one size: no fitted reading shows those that held-out stretches hide.
     """
-    hidden = [c.amplitude for c in fit.candidates if search.is_hidden_state(c)]
+    hidden = [
+        c.amplitude
+        for c in fit.candidates
+        if search.is_hidden_state(c) or _as_state(search, problem, fit, c) is not None
+    ]
     found: dict[str, InferredState] = {}
     # Of several each depends on what the others did where no fitted reading tells.
     for _ in range(min(len(hidden), SEVERAL_ROUNDS)):
@@ -162,13 +170,23 @@ def _inferred(
 ) -> InferredState | None:
     """One hidden state of a fit inferred from all readings; None where nothing switches."""
     candidate = next(c for c in fit.candidates if c.amplitude == name)
-    place, course, _ = search.courses[name]
-    drive = problem.predictor.drives[place.recording]
-    course = _on_steps(course, search.problem.predictor.drives[place.recording].grid, drive.grid)
     own = replace(search, problem=problem)
+    switched = search.is_hidden_state(candidate)
+    if switched:
+        place, course, _ = search.courses[name]
+        drive = problem.predictor.drives[place.recording]
+        course = _on_steps(course, search.problem.predictor.drives[place.recording].grid, drive.grid)
+    else:
+        place, course = _as_state(search, problem, fit, candidate)
+        drive = problem.predictor.drives[place.recording]
     again = course_about(own, fit, place, candidate, course, everything=True, effort=effort)
     if again is None:
         return None
+    if not switched:
+        held = _held_out(problem.predictor, place.recording)
+        again = replace(again, on=np.where(held, again.on, course.on))
+        if np.array_equal(again.on, course.on):
+            return None
     intervals = intervals_of(again.on, drive.grid)
     middle = 0.5 * (drive.grid[1:] + drive.grid[:-1])
     within = [(middle > start) & (middle < end) for start, end in intervals]
@@ -185,6 +203,37 @@ def _inferred(
         filled = float(on[conditions[best] == 1].sum() / length[conditions[best] == 1].sum())
         state = replace(state, gate=best, inside=inside[best], filled=filled)
     return state
+
+
+def _as_state(
+    search: Search, problem: Problem, fit: Fit, candidate: Candidate
+) -> tuple[StatePlace, Course] | None:
+    """Place and course of what a fit has in several intervals at one size; None for anything else."""
+    if not search.in_intervals(candidate) or search.is_hidden_state(candidate) or candidate.form:
+        return None
+    effect, values = search.effects[candidate.effect], fit.values
+    intervals, sizes = effect.intervals(candidate, values), effect.sizes(candidate, values)
+    if len(intervals) < SEVERAL or max(sizes) > ONE_SIZE * min(sizes):
+        return None
+    wanted = candidate.effect, candidate.component, candidate.recording or 0
+    place = next(
+        (p for p in state_places(search) if (p.effect.name, p.pattern.spot, p.recording) == wanted), None
+    )
+    if place is None or not _held_out(problem.predictor, place.recording).any():
+        return None
+    grid = problem.predictor.drives[place.recording].grid
+    middle = 0.5 * (grid[1:] + grid[:-1])
+    on = np.any([(middle > start) & (middle < end) for start, end in intervals], axis=0)
+    chain = Chain.usual(np.zeros(len(on), dtype=np.int64))
+    return place, Course(on, on.astype(float), float(np.mean(sizes)), 0.0, 0.0, 0.0, chain)
+
+
+def _held_out(predictor: Predictor, number: int) -> NDArray[np.bool_]:
+    """Steps of a recording in which readings are held out, (T,)."""
+    grid = predictor.drives[number].grid
+    middle = 0.5 * (grid[1:] + grid[:-1])
+    held = stretches(~predictor.use[number], predictor.recordings[number].times)
+    return np.any([np.zeros(len(middle), bool), *((middle > a) & (middle < b) for a, b in held)], axis=0)
 
 
 def _on_steps(course: Course, grid: Array, other: Array) -> Course:
@@ -207,6 +256,9 @@ def states_on_rows(
     problem = Problem(fine, final.belief, final.slow, fine.observations)
     found = {}
     for name, state in inferred_states(search, problem, fit, ON_ROWS).items():
+        if name not in search.courses:
+            found[name] = state
+            continue
         place, course, _ = search.courses[name]
         width = BLUR * float(np.median(np.diff(averaged.drives[place.recording].grid)))
         intervals = place.effect.intervals(state.candidate, {})
