@@ -8,7 +8,7 @@ import numpy as np
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hidden_states import without
-from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis import Hypothesis, identity
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search, Task
 from spindle_fem.inference.input_sampling import left_over_noise
@@ -73,6 +73,7 @@ def run_search(search: Search, begin: Mapping[str, float]) -> list[Hypothesis]:
     if is_network:
         _levels_beside(search)
         _beside(search)
+        _levels_for_laws(search)
         # What was found beside a law may explain all that the law did.
         reduced(search)
     return search.ranked()
@@ -160,6 +161,16 @@ def _beside(search: Search) -> None:
             # A state that is followed again gains a little every time.
             return
         best = again
+
+
+def _levels_for_laws(search: Search) -> None:
+    """Levels in the stead of the laws beside a state: sought after those, they may find their place taken."""
+    best = search.ranked()[0]
+    states = tuple(c for c in best.fit.candidates if search.is_hidden_state(c))
+    alone = search.found.get(identity(states))
+    if not states or len(states) == len(best.fit.candidates) or _leaves_little(search, best) or alone is None:
+        return
+    add_steps(search, alone.fit)
 
 
 def _second_event(search: Search) -> None:

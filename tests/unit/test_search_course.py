@@ -7,6 +7,7 @@ import pytest
 from spindle_fem.inference import search_course, tuned
 from spindle_fem.inference.hypothesis import identity
 from spindle_fem.inference.hypothesis_search import Search
+from tests.support.made_hypotheses import candidate
 
 
 class Ever:
@@ -50,6 +51,37 @@ def test_a_state_that_gains_a_little_every_time_is_not_followed_for_ever(monkeyp
     search_course._beside(search)
     assert search.rounds == rounds
     assert asked == [("state",)] * rounds
+
+
+@pytest.mark.parametrize(
+    ("best", "explained", "asked"),
+    [
+        ("state law", False, ["state"]),
+        ("state law other", False, ["state"]),
+        ("state law", True, []),
+        ("state", False, []),
+        ("law other", False, []),
+    ],
+)
+def test_levels_are_sought_in_the_stead_of_laws_beside_a_state(monkeypatch, best, explained, asked):
+    """Laws are found before levels, whose place they may have taken."""
+
+    def found(names):
+        members = tuple(candidate(name) for name in names.split())
+        return SimpleNamespace(keys=frozenset(names.split()), fit=SimpleNamespace(candidates=members))
+
+    search = SimpleNamespace(
+        ranked=lambda: [found(best)],
+        found={identity(found(names).fit.candidates): found(names) for names in ("state", best)},
+        is_hidden_state=lambda item: item.effect == "state",
+    )
+    begun = []
+    monkeypatch.setattr(search_course, "_leaves_little", lambda search, best: explained)
+    monkeypatch.setattr(
+        search_course, "add_steps", lambda search, fit: begun.extend(c.effect for c in fit.candidates)
+    )
+    search_course._levels_for_laws(search)
+    assert begun == asked
 
 
 def test_what_changes_is_sought_beside_the_best_laws_that_leave_room_for_it():
