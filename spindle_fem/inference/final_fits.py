@@ -13,7 +13,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.followed_readings import FollowedReadings
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
-from spindle_fem.inference.like_sets import may_stand_for
+from spindle_fem.inference.like_sets import free_in_time, may_stand_for
 from spindle_fem.inference.other_answers import with_other_answers
 from spindle_fem.inference.set_problems import SetProblems, combination_of
 from spindle_fem.inference.verdict import tempered
@@ -58,6 +58,11 @@ def to_be_fitted(
     for size in range(len(members)):
         chosen += [h for h in everything if len(h.fit.candidates) == size and h not in chosen][:1]
     first = ranked[0].fit
+    if coarseness > 1.0 and free_in_time(first):
+        # Laws that leave little of a coarse machine come before what may be on at any time.
+        for size in range(1, len(members) + 1):
+            laws = [h for h in ranked if len(h.keys) == size and not free_in_time(h.fit)]
+            chosen += [h for h in laws[: tuned.LAWS_REFITTED] if h not in chosen]
     rivals = [
         h
         for h in ranked

@@ -11,13 +11,13 @@ from scipy.stats import chi2, norm
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference import tuned
+from spindle_fem.inference.coarse_sets import that_leave_least, with_needed_events
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked
 from spindle_fem.inference.hypothesis_fit import Fit, amplitude_name
 from spindle_fem.inference.like_sets import (
     are_alike,
     as_one,
-    free_in_time,
     holds,
     leaves_unnamed,
     likeliest_first,
@@ -228,8 +228,9 @@ def judge(
     coarseness : float
         As :func:`tempered` has it.
     """
+    before = rank(hypotheses, coarseness)
     if coarseness > 1.0:
-        hypotheses = _without_parts(_with_needed_events(hypotheses, left, beyond), left, beyond)
+        hypotheses = that_leave_least(with_needed_events(hypotheses, left, beyond), left, beyond)
     ranked = rank(hypotheses, coarseness)
     p_value = detection_p_value(hypotheses, trials, coarseness)
     empty = next(item for item in ranked if not item.fit.candidates)
@@ -298,8 +299,8 @@ def judge(
     # Which bearing of a set it is does not matter for the decision; the best represents all.
     alike, rivals = as_one(ranked, known_as_one)
     # What held-out readings say of a rival is asked by itself.
-    before = as_one(list(fitted.values()), known_as_one)
-    likely = [i.fit for i in (before[0], *before[1]) if i.probability >= tuned.NEAR_PROBABILITY]
+    by_fits = as_one(list(fitted.values()), known_as_one)
+    likely = [i.fit for i in (by_fits[0], *by_fits[1]) if i.probability >= tuned.NEAR_PROBABILITY]
     near = [
         item
         for item in rivals
@@ -321,6 +322,12 @@ def judge(
         if (known * max(item.probability, by_all[item.fit.named_keys]) >= tuned.LISTED or item in near)
         and item.fit.candidates
     )
+    # What a coarse machine gives up although it is likely shares what is left.
+    over = 1.0 - known * evidence - sum(item.probability for item in alternatives)
+    given_up = (Ranked(i.best, over * i.probability) for i in before if i.fit.named_keys not in by_all)
+    alternatives += tuple(
+        item for item in given_up if item.probability >= tuned.LISTED and item.fit.candidates
+    )
     # What every likely set holds is sure, whether there is more or not.
     common = sum(item.probability for item in ranked if holds(item.fit, chosen.fit, known_as_one))
     several = common * (1.0 - nothing) < tuned.DECIDED or bool(near)
@@ -339,12 +346,12 @@ def judge(
         reason = DOUBTED_REASON
     verdict: Verdict = kind if decided else "ambiguous"
     if rest > tuned.MOST_LEFT:
-        before = left(empty.fit)
+        without = left(empty.fit)
         verdict = "unexplained"
         reason = (
             f"the best set leaves {rest:.1f} times what the errors expected of sensors allow (noise with its "
-            f"slow part, robust root mean square of fitted readings), where {before:.1f} times was left "
-            f"without it: it explains {100.0 * (1.0 - (rest / before) ** 2):.0f} % of the mismatch"
+            f"slow part, robust root mean square of fitted readings), where {without:.1f} times was left "
+            f"without it: it explains {100.0 * (1.0 - (rest / without) ** 2):.0f} % of the mismatch"
         )
     return Judgement(
         verdict,
@@ -426,47 +433,6 @@ def unexplained_share(rest: float) -> float:
     """
     odds = max(0.0, rest - 1.0) ** 2
     return odds / (1.0 + odds)
-
-
-def _with_needed_events(
-    hypotheses: Sequence[Hypothesis], left: Callable[[Fit], float], beyond: Callable[[Fit], float]
-) -> list[Hypothesis]:
-    """Sets without those of which some members, with fewer events, leave no more than may be left of them.
-
-    Neither in units of the noise nor of the errors that were expected before these readings, and held-out
-    ones not much more than the set. What may come and go at any time fits some of whatever a coarse picture
-    leaves, and follows held-out readings itself: that they become a little likelier with it says nothing.
-    """
-    events = {id(item): free_in_time(item.fit) for item in hypotheses}
-
-    def needed(item: Hypothesis) -> bool:
-        return all(
-            np.sqrt(other.expected_misfit) > tuned.UNEXPLAINED_MISFIT
-            or max(left(other.fit), beyond(other.fit)) > tuned.MOST_LEFT
-            or 0.0 < beyond(item.fit) < (1.0 - tuned.IMPROVEMENT_OF_EVENTS) * beyond(other.fit)
-            for other in hypotheses
-            if other.keys < item.keys and events[id(other)] < events[id(item)]
-        )
-
-    return [item for item in hypotheses if not events[id(item)] or needed(item)]
-
-
-def _without_parts(
-    hypotheses: Sequence[Hypothesis], left: Callable[[Fit], float], beyond: Callable[[Fit], float]
-) -> list[Hypothesis]:
-    """Sets without those that leave too much where one that holds them and more leaves little.
-
-    What is too much for a part to be named counts for the whole, although the likelihood, which takes what
-    a set leaves for error, may weigh both alike.
-    """
-    whole = [item for item in hypotheses if item.keys and left(item.fit) <= tuned.MOST_LEFT]
-
-    def is_part(item: Hypothesis) -> bool:
-        return left(item.fit) > tuned.MOST_LEFT and any(
-            item.keys < other.keys and beyond(other.fit) < beyond(item.fit) for other in whole
-        )
-
-    return [item for item in hypotheses if not item.keys or not is_part(item)]
 
 
 def _without(ranked: Sequence[Ranked], empty: Ranked) -> list[Ranked]:

@@ -7,21 +7,23 @@ import pytest
 
 from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.term import TermParameter
-from spindle_fem.effects.framework.unrecorded import InIntervals, UnrecordedHeatTerm
+from spindle_fem.effects.framework.unrecorded import STATES, InIntervals, UnrecordedHeatTerm
 from spindle_fem.inference import tuned
 from spindle_fem.inference.verdict import rank
 from tests.support.made_hypotheses import OFFSET, PRELOAD, candidate, hypothesis, verdict
 
 
 def test_events_of_a_network_are_named_where_laws_without_them_leave_too_much():
-    heat = "unrecorded_heat_source"
-    term = UnrecordedHeatTerm(heat, TermParameter("heat", 1.0, 1.2), Spread(()), InIntervals([(0.0, 100.0)]))
-    event = replace(candidate(heat, "oil"), terms=(term,))
+    heat, size = "unrecorded_heat_source", TermParameter("heat", 1.0, 1.2)
+    term = UnrecordedHeatTerm(heat, size, Spread(()), InIntervals([(0.0, 100.0)]))
+    event = replace(candidate(heat, "oil"), terms=(term,), amplitude=f"{heat}.heat")
     null, law = hypothesis(misfit=2000.0), hypothesis(PRELOAD, misfit=900.0)
     alone, both = hypothesis(event, misfit=500.0), hypothesis(PRELOAD, event, misfit=400.0)
     little, much = 0.9 * tuned.MOST_LEFT, 1.1 * tuned.MOST_LEFT
 
-    def found(of_nothing, of_law, *sets, coarseness=2.0, later=1.0):
+    enough = 0.9 - tuned.LEAST_OF_EVENTS
+
+    def found(of_nothing, of_law, *sets, coarseness=2.0, later=enough):
         rest = {id(null.fit): of_nothing, id(law.fit): of_law}
         left = {
             "left": lambda fit: rest.get(id(fit), 1.0),
@@ -30,12 +32,33 @@ def test_events_of_a_network_are_named_where_laws_without_them_leave_too_much():
         return verdict(*sets, coarseness=coarseness, **left).chosen.fit.keys
 
     assert found(much, much, null, alone) == alone.keys
+    # A state, which follows held-out readings, hardly tells them better where much is left without it.
+    state = replace(
+        event, terms=(UnrecordedHeatTerm(heat, size, Spread(()), InIntervals([(0.0, 9.0)], STATES)),)
+    )
+    hidden = hypothesis(state, misfit=500.0)
+    for hardly, expected in ((1.1, null), (0.9, hidden)):
+        left = {"left": lambda fit: much if fit is null.fit else 1.0}
+        later = hardly - tuned.LEAST_OF_EVENTS
+        said = verdict(
+            null,
+            hidden,
+            coarseness=2.0,
+            beyond=lambda fit, later=later: later if fit.candidates else 1.0,
+            **left,
+        )
+        assert said.chosen.fit.keys == expected.keys
+    assert found(much, much, null, alone, later=1.1 - tuned.LEAST_OF_EVENTS) == alone.keys
     assert found(little, much, null, alone) == null.keys
     # It tells held-out readings far better.
     assert found(little, much, null, alone, later=0.9 - tuned.IMPROVEMENT_OF_EVENTS) == alone.keys
     assert found(little, much, null, alone, later=1.1 - tuned.IMPROVEMENT_OF_EVENTS) == null.keys
     assert found(much, little, null, law, both) == law.keys
     assert found(much, much, null, law, both) == both.keys
+    # A law elsewhere that leaves little does as well.
+    assert found(much, little, null, law, alone) == law.keys
+    assert found(much, much, null, law, alone) == alone.keys
+    assert found(much, little, null, law, alone, later=0.9 - tuned.IMPROVEMENT_OF_EVENTS) == alone.keys
     assert found(little, much, null, alone, coarseness=1.0) == alone.keys
     assert found(little, much, replace(null, expected_misfit=3.0), alone) == alone.keys
 
@@ -58,7 +81,7 @@ def test_a_second_event_is_named_where_one_leaves_too_much():
             both,
             coarseness=2.0,
             left=lambda fit, rest=rest: rest.get(id(fit), 1.0),
-            beyond=lambda fit: 1.0,
+            beyond=lambda fit: {0: 9.0, 1: 1.25}.get(len(fit.keys), 1.0),
         )
         assert found.chosen.fit.keys == expected.keys
 
@@ -81,6 +104,38 @@ def test_a_part_that_leaves_too_much_gives_way_to_the_whole_that_leaves_little()
     assert found(0.9, 1.0, null, part, whole) == part.keys
     assert found(1.1, 2.5, null, part, whole) == part.keys
     assert found(1.1, 1.0, null, part, other) == part.keys
+
+
+def test_a_set_gives_way_to_one_of_no_more_effects_that_leaves_less_of_all_readings():
+    """Likelihoods of a coarse picture, which take what is left for error, may say the contrary."""
+    null, likely = hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=400.0)
+    exact, more = hypothesis(OFFSET, misfit=480.0), hypothesis(PRELOAD, OFFSET, misfit=479.0)
+
+    def found(fitted, heldout, other, coarseness=2.0):
+        def share(of_other):
+            return lambda fit: 9.0 if not fit.candidates else of_other if fit is other.fit else 1.0
+
+        left = {"left": share(fitted), "beyond": share(heldout)}
+        return verdict(null, likely, other, coarseness=coarseness, **left).chosen.fit.keys
+
+    less, alike = 0.99 - tuned.LEAST_IMPROVEMENT, 1.01 - tuned.LEAST_IMPROVEMENT
+    assert found(less, less, exact) == exact.keys
+    assert found(less, alike, exact) == likely.keys
+    assert found(alike, less, exact) == likely.keys
+    assert found(less, less, more) == likely.keys
+    assert found(less, less, exact, coarseness=1.0) == likely.keys
+
+
+def test_what_is_likely_but_leaves_more_is_listed_with_a_share_of_what_is_left():
+    null, likely = hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=400.0)
+    exact = hypothesis(OFFSET, misfit=480.0)
+    rest = {id(null.fit): 9.0, id(likely.fit): 1.2}
+    left = dict.fromkeys(("left", "beyond"), lambda fit: rest.get(id(fit), 1.0))
+    found = verdict(null, likely, exact, coarseness=2.0, **left)
+    assert found.chosen.fit.keys == exact.keys
+    (other,) = found.alternatives
+    assert other.fit.keys == likely.keys
+    assert tuned.LISTED < other.probability < 1.0 - found.chosen.probability
 
 
 def test_what_one_set_gains_over_another_of_its_size_counts_less_where_the_model_is_coarse():
