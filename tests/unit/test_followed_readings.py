@@ -1,9 +1,12 @@
 """What sets say of all readings, those that were held out included: on the lumped spindle."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from spindle_fem.effects.registry import effect_of
+from spindle_fem.inference import tuned
 from spindle_fem.inference.followed_readings import FollowedReadings
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW
@@ -46,3 +49,19 @@ def test_a_moment_within_held_out_readings_follows_them(problem_and_fits):
     followed = FollowedReadings(SetProblems(problem, problem)).followed(early).fit
     ((_, ended),) = effect_of("unrecorded_heat_source").intervals(early.candidates[0], followed.values)
     assert 4900.0 < ended <= 5000.0 < UNTIL
+
+
+@pytest.mark.parametrize(
+    ("error", "beyond", "kept"), [(1.01, 1.01, False), (1.01, 0.99, True), (0.99, 1.01, True)]
+)
+def test_a_set_that_tells_held_out_readings_worse_than_a_part_of_it_is_given_up(error, beyond, kept):
+    """By the mean square, ``error`` over its limit, unless most are told better, ``beyond`` over its."""
+    law, event = ("windage", "shaft"), ("unrecorded_heat_source", "body")
+    part, whole, other = (
+        SimpleNamespace(keys=frozenset(keys), fit=name)
+        for name, keys in (("part", {law}), ("whole", {law, event}), ("other", {event}))
+    )
+    errors = {"part": 2.0, "whole": 2.0 * error * tuned.WORSE_HELDOUT, "other": 9.0}
+    most = {"part": 1.0, "whole": beyond * (1.0 - tuned.LEAST_IMPROVEMENT), "other": 9.0}
+    readings = SimpleNamespace(_heldout_error=errors.get, beyond=most.get)
+    assert (whole in FollowedReadings.kept(readings, [part, whole, other])) is kept
