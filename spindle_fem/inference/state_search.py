@@ -172,13 +172,10 @@ def _inferred(
     candidate = next(c for c in fit.candidates if c.amplitude == name)
     own = replace(search, problem=problem)
     switched = search.is_hidden_state(candidate)
+    place, course = search.courses[name][:2] if switched else _as_state(search, problem, fit, candidate)
+    drive = problem.predictor.drives[place.recording]
     if switched:
-        place, course, _ = search.courses[name]
-        drive = problem.predictor.drives[place.recording]
         course = _on_steps(course, search.problem.predictor.drives[place.recording].grid, drive.grid)
-    else:
-        place, course = _as_state(search, problem, fit, candidate)
-        drive = problem.predictor.drives[place.recording]
     again = course_about(own, fit, place, candidate, course, everything=True, effort=effort)
     if again is None:
         return None
@@ -208,8 +205,9 @@ def _inferred(
 def _as_state(
     search: Search, problem: Problem, fit: Fit, candidate: Candidate
 ) -> tuple[StatePlace, Course] | None:
-    """Place and course of what a fit has in several intervals at one size; None for anything else."""
-    if not search.in_intervals(candidate) or search.is_hidden_state(candidate) or candidate.form:
+    """Place and course of what a network's fit has in several intervals at one size; None for anything else."""
+    free = search.in_intervals(candidate) and not search.is_hidden_state(candidate)
+    if not (problem.predictor.is_network and free) or candidate.form:
         return None
     effect, values = search.effects[candidate.effect], fit.values
     intervals, sizes = effect.intervals(candidate, values), effect.sizes(candidate, values)
