@@ -205,7 +205,7 @@ def _inferred(
 def _as_state(
     search: Search, problem: Problem, fit: Fit, candidate: Candidate
 ) -> tuple[StatePlace, Course] | None:
-    """Place and course of what a network's fit has in several intervals at one size; None for anything else."""
+    """Place and course of what a network has in several intervals at one size; None for anything else."""
     free = search.in_intervals(candidate) and not search.is_hidden_state(candidate)
     if not (problem.predictor.is_network and free) or candidate.form:
         return None
