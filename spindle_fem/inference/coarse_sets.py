@@ -57,8 +57,10 @@ def that_leave_least(
     """Sets without those that leave too much where one that holds them and more leaves little.
 
     What is too much for a part to be named counts for the whole, although the likelihood, which takes what
-    a set leaves for error, may weigh both alike. For the same reason without those beside which one of no
-    more effects leaves less, of fitted and of held-out readings.
+    a set leaves for error, may weigh both alike. For the same reason without those that leave more than the
+    noise beside one of no more effects that leaves less, of fitted and of held-out readings. And without
+    those of which one effect lowers little what the others leave, where that may be left: any effect beside
+    the right one explains a little of what the nodes of a network miss.
     """
     most = {id(item): max(left(item.fit), beyond(item.fit)) for item in hypotheses}
     whole = [item for item in hypotheses if item.keys and most[id(item)] <= tuned.MOST_LEFT]
@@ -69,11 +71,25 @@ def that_leave_least(
         )
 
     def leaves_more(item: Hypothesis) -> bool:
-        return any(
+        return most[id(item)] > 1.0 and any(
             left(other.fit) < (1.0 - tuned.LEAST_IMPROVEMENT) * left(item.fit)
             and beyond(other.fit) < (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(item.fit)
             for other in hypotheses
             if other.keys and len(other.fit.named) <= len(item.fit.named)
         )
 
-    return [item for item in hypotheses if not item.keys or not (is_part(item) or leaves_more(item))]
+    def adds_little(item: Hypothesis) -> bool:
+        parts = [o for o in hypotheses if o.keys < item.keys and len(o.keys) == len(item.keys) - 1 > 0]
+        if not parts:
+            return False
+        likeliest = min(parts, key=lambda part: part.misfit)
+        least = 1.0 - tuned.LEAST_OF_A_MEMBER
+        return most[id(likeliest)] <= tuned.MOST_LEFT and (
+            left(item.fit) > least * left(likeliest.fit) or beyond(item.fit) > least * beyond(likeliest.fit)
+        )
+
+    return [
+        item
+        for item in hypotheses
+        if not item.keys or not (is_part(item) or leaves_more(item) or adds_little(item))
+    ]

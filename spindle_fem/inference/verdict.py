@@ -384,16 +384,18 @@ def _predicts(
     chance hardly leaves such a machine (``ruled_out``).
     A coarse model leaves more than noise, so that likelihoods exaggerate: for a network the residual
     counts, that of fitted readings too, and sensors' white noise hides less of it. If the fit without effects
-    leaves only noise, with directions far from their priors, a smaller residual does not count.
+    leaves only noise, likelihoods must say so too, and a set leave clearly less.
     """
     if chosen.heldout is None or empty.heldout is None:
         return True
-    if coarseness > 1.0 and max(left(empty.fit), beyond(empty.fit)) > 1.0:
-        lower = beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
-        return lower and left(chosen.fit) <= (1.0 + tuned.LEAST_IMPROVEMENT) * left(empty.fit)
     gain = _heldout_gain(chosen, empty)
     if coarseness > 1.0:
-        return gain >= tuned.LEAST_HELDOUT_GAIN
+        within = max(left(empty.fit), beyond(empty.fit)) <= 1.0
+        least = tuned.LEAST_OF_A_MEMBER if within else tuned.LEAST_IMPROVEMENT
+        most = 1.0 - least if within else 1.0 + least
+        lower = beyond(chosen.fit) <= (1.0 - least) * beyond(empty.fit)
+        enough = gain >= tuned.LEAST_HELDOUT_GAIN or not within
+        return enough and lower and left(chosen.fit) <= most * left(empty.fit)
     # A quarter of the readings is held out by default.
     rest, before = (np.sqrt(3.0 * left(fit) ** 2 + beyond(fit) ** 2) for fit in (chosen.fit, empty.fit))
     lower = ruled_out or rest <= (1.0 - tuned.LEAST_IMPROVEMENT_DRAWN) * before

@@ -47,8 +47,10 @@ def test_a_verdict_doubts_thirds_of_a_machine_that_is_drawn():
         )
         return replace(triple, log_prior=1.0 - float(np.log(three / two)))
 
+    # Each effect lowers what is left.
+    left = dict.fromkeys(("left", "beyond"), lambda fit: {0: 1.8, 2: 1.3, 3: 1.0}[len(fit.keys)])
     for coarseness, members in ((1.0, 2), (1.1, 3)):
-        found = verdict(nothing, pair, likelier(coarseness), calibrated=True, coarseness=coarseness)
+        found = verdict(nothing, pair, likelier(coarseness), calibrated=True, coarseness=coarseness, **left)
         assert len(found.chosen.fit.keys) == members
 
 

@@ -10,7 +10,7 @@ from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.effects.framework.unrecorded import STATES, InIntervals, UnrecordedHeatTerm
 from spindle_fem.inference import tuned
 from spindle_fem.inference.verdict import rank
-from tests.support.made_hypotheses import OFFSET, PRELOAD, candidate, hypothesis, verdict
+from tests.support.made_hypotheses import CHURNING, OFFSET, PRELOAD, candidate, hypothesis, verdict
 
 
 def test_events_of_a_network_are_named_where_laws_without_them_leave_too_much():
@@ -111,9 +111,9 @@ def test_a_set_gives_way_to_one_of_no_more_effects_that_leaves_less_of_all_readi
     null, likely = hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=400.0)
     exact, more = hypothesis(OFFSET, misfit=480.0), hypothesis(PRELOAD, OFFSET, misfit=479.0)
 
-    def found(fitted, heldout, other, coarseness=2.0):
+    def found(fitted, heldout, other, coarseness=2.0, most=1.1):
         def share(of_other):
-            return lambda fit: 9.0 if not fit.candidates else of_other if fit is other.fit else 1.0
+            return lambda fit: 9.0 if not fit.candidates else most * (of_other if fit is other.fit else 1.0)
 
         left = {"left": share(fitted), "beyond": share(heldout)}
         return verdict(null, likely, other, coarseness=coarseness, **left).chosen.fit.keys
@@ -124,6 +124,28 @@ def test_a_set_gives_way_to_one_of_no_more_effects_that_leaves_less_of_all_readi
     assert found(alike, less, exact) == likely.keys
     assert found(less, less, more) == likely.keys
     assert found(less, less, exact, coarseness=1.0) == likely.keys
+    # Less than the noise is no better than the noise.
+    assert found(less, less, exact, most=0.9) == likely.keys
+
+
+def test_one_effect_more_must_lower_what_a_network_leaves_of_fitted_and_of_held_out_readings():
+    """What its nodes miss is explained a little by any effect beside the right one."""
+    null, one = hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=900.0)
+    two = hypothesis(PRELOAD, CHURNING, misfit=400.0)
+
+    def found(fitted, heldout, coarseness=2.0, of_one=1.5):
+        def share(of_two):
+            return lambda fit: {0: 9.0, 1: of_one, 2: of_two * of_one}[len(fit.keys)]
+
+        left = {"left": share(fitted), "beyond": share(heldout)}
+        return verdict(null, one, two, coarseness=coarseness, **left).chosen.fit.keys
+
+    little, much = 1.01 - tuned.LEAST_OF_A_MEMBER, 0.99 - tuned.LEAST_OF_A_MEMBER
+    assert found(much, much) == two.keys
+    assert found(little, much) == found(much, little) == one.keys
+    # Likelihoods of a drawn machine hold, and what leaves too much alone is no answer.
+    assert found(little, little, coarseness=1.0) == two.keys
+    assert found(little, little, of_one=2.2) == two.keys
 
 
 def test_what_is_likely_but_leaves_more_is_listed_with_a_share_of_what_is_left():
