@@ -242,8 +242,10 @@ def judge(
         p_value = min(p_value, heldout_p_value(first, empty.best, coarseness))
     odds = {keys: _log_odds(item, fitted[empty.fit.named_keys]) for keys, item in fitted.items()}
     nothing = 0.0
-    # A coarse machine leaves errors of its own, which no p-value knows: what is likelier than all sets stays.
-    stays = coarseness > 1.0 and empty.probability > tuned.STILL_POSSIBLE
+    # A coarse machine leaves errors of its own, which no p-value knows: what is likelier than all sets stays,
+    # unless it leaves more than may be left.
+    little = max(left(empty.fit), beyond(empty.fit)) <= tuned.MOST_LEFT
+    stays = coarseness > 1.0 and empty.probability > tuned.STILL_POSSIBLE and little
     if p_value <= tuned.SIGNIFICANT and not stays:
         ranked = _without(ranked, empty)
     by_all = {item.fit.named_keys: item.probability for item in ranked}

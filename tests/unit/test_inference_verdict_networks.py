@@ -182,3 +182,10 @@ def test_nothing_missing_of_a_coarse_machine_stays_where_it_is_likelier_than_all
             said = verdict(*found, coarseness=coarseness)
             assert (said.verdict, coarseness) == (expected, coarseness)
             assert said.p_value < tuned.RULED_OUT
+    # What leaves more than may be left is no answer, where a set leaves half of it.
+    null, dear = hypothesis(misfit=480.0, log_prior=-0.5), hypothesis(dear, misfit=400.0, evidence=-230.0)
+    for most, expected in ((0.99, null), (1.01, dear)):
+        rest = {id(null.fit): most * tuned.MOST_LEFT}
+        left = dict.fromkeys(("left", "beyond"), lambda fit, rest=rest: rest.get(id(fit), 1.0))
+        said = verdict(*(replace(h, heldout=500.0) for h in (null, dear)), coarseness=1.1, **left)
+        assert said.chosen.fit.keys == expected.keys
