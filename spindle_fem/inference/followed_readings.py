@@ -154,7 +154,14 @@ class FollowedReadings:
         without it makes up for that: sizes and laws are fitted again, to the same readings as before.
         """
         if id(fit) not in self._followed:
-            self._followed[id(fit)] = fit, self.with_states(fit, self._follow(fit))
+            states = self._follow(fit)
+            found = self.with_states(fit, states)
+            hidden = {c.amplitude for c in fit.candidates if c.free.keys() == {c.amplitude}}
+            if not states.keys() <= hidden:
+                # Intervals with edges of their own stay as they were fitted where that leaves less.
+                fitted = {name: state for name, state in states.items() if name in hidden}
+                found = min(self.with_states(fit, fitted), found, key=self.left_with)
+            self._followed[id(fit)] = fit, found
         return self._followed[id(fit)][1]
 
     def with_states(self, fit: Fit, states: Mapping[str, InferredState]) -> Followed:

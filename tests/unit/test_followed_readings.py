@@ -65,3 +65,16 @@ def test_a_set_that_tells_held_out_readings_worse_than_a_part_of_it_is_given_up(
     most = {"part": 1.0, "whole": beyond * (1.0 - tuned.LEAST_IMPROVEMENT), "other": 9.0}
     readings = SimpleNamespace(_heldout_error=errors.get, beyond=most.get)
     assert (whole in FollowedReadings.kept(readings, [part, whole, other])) is kept
+
+
+@pytest.mark.parametrize(("left", "kept"), [(0.9, True), (1.1, False)])
+def test_intervals_with_edges_of_their_own_are_followed_where_that_leaves_less(monkeypatch, left, kept):
+    pulses = SimpleNamespace(amplitude="heat", free={"heat": None, "start_1": None})
+    state = SimpleNamespace(amplitude="loss", free={"loss": None})
+    fit = SimpleNamespace(candidates=(pulses, state))
+    readings = FollowedReadings.__new__(FollowedReadings)
+    readings._followed, readings._follow = {}, lambda fit: {"heat": "by all", "loss": "by all"}
+    monkeypatch.setattr(FollowedReadings, "with_states", lambda self, fit, states: states)
+    monkeypatch.setattr(FollowedReadings, "left_with", lambda self, states: left if "heat" in states else 1.0)
+    assert ("heat" in readings.followed(fit)) is kept
+    assert "loss" in readings.followed(fit)
