@@ -132,7 +132,7 @@ def without_repeats(ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], float]
             for other in ranked
             if id(other) in left
             and _repeats(item.fit, other.fit)
-            and (apart(item.fit, other.fit) < tuned.SAME_READINGS or not _tells_more(item.best, other.best))
+            and (apart(item.fit, other.fit) < tuned.SAME_READINGS or gain_over(item.best, other.best) <= 0.0)
         ]
         if simpler:
             left[id(simpler[0])] += left.pop(id(item))
@@ -140,12 +140,12 @@ def without_repeats(ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], float]
     return sorted(found, key=lambda item: -item.probability)
 
 
-def _tells_more(one: Hypothesis, other: Hypothesis) -> bool:
-    """Whether a set makes the readings, fitted and held out, likelier than another."""
+def gain_over(one: Hypothesis, other: Hypothesis) -> float:
+    """How much less misfit a set has than another, of fitted and, where both have them, held-out readings."""
     gain = other.misfit - one.misfit
     if one.heldout is not None and other.heldout is not None:
         gain += other.heldout - one.heldout
-    return gain > 0.0
+    return gain
 
 
 def _repeats(fit: Fit, other: Fit) -> bool:

@@ -18,6 +18,7 @@ from spindle_fem.inference.hypothesis_fit import Fit, amplitude_name
 from spindle_fem.inference.like_sets import (
     are_alike,
     as_one,
+    gain_over,
     holds,
     leaves_unnamed,
     likeliest_first,
@@ -417,10 +418,7 @@ def _told_by_readings(chosen: Hypothesis, other: Hypothesis, coarseness: float) 
     Held-out readings count as fitted ones do, which are three times as many; both less where the model is
     coarse, as :func:`tempered` has it.
     """
-    gain = other.misfit - chosen.misfit
-    if chosen.heldout is not None and other.heldout is not None:
-        gain += other.heldout - chosen.heldout
-    return 0.5 * gain / (tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness)))
+    return 0.5 * gain_over(chosen, other) / (tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness)))
 
 
 def _log_odds(item: Ranked, empty: Ranked) -> float:
