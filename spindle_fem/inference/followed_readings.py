@@ -14,6 +14,7 @@ from spindle_fem.inference.belief import GivenUp
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.input_sampling import error_over_noise, left_over_noise
+from spindle_fem.inference.like_sets import only_size_free
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.reading_noise import ChannelBins
 from spindle_fem.inference.set_problems import SetProblems
@@ -156,7 +157,7 @@ class FollowedReadings:
         if id(fit) not in self._followed:
             states = self._follow(fit)
             found = self.with_states(fit, states)
-            hidden = {c.amplitude for c in fit.candidates if c.free.keys() == {c.amplitude}}
+            hidden = {c.amplitude for c in fit.candidates if only_size_free(c)}
             if not states.keys() <= hidden:
                 # Intervals with edges of their own stay as they were fitted where that leaves less.
                 fitted = {name: state for name, state in states.items() if name in hidden}

@@ -22,6 +22,7 @@ from spindle_fem.inference.candidate_response import Variant, variants_of
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis, identity
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.like_sets import only_size_free
 from spindle_fem.inference.linearised_fit import LinearProblem
 from spindle_fem.inference.missing_heat import (
     OnOff,
@@ -266,7 +267,7 @@ class Search:
 
     def is_hidden_state(self, candidate: Candidate) -> bool:
         """Whether a candidate is on along a course that was found, of which only the size is free."""
-        return candidate.amplitude in self.courses and candidate.free.keys() == {candidate.amplitude}
+        return candidate.amplitude in self.courses and only_size_free(candidate)
 
     def task(
         self, fit: Fit, additions: Sequence[tuple[Variant, float]], intervals: Mapping[int, OnOff]

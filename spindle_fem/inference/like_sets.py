@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from spindle_fem.effects.framework.effect import IntervalEffect, in_intervals
+from spindle_fem.effects.framework.effect import Candidate, IntervalEffect, in_intervals
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked
@@ -31,10 +31,14 @@ def free_in_time(fit: Fit) -> int:
     return sum(in_intervals(effect_of(c.effect), c) for c in fit.candidates)
 
 
+def only_size_free(candidate: Candidate) -> bool:
+    """Whether nothing of a candidate is free but its size: of what is on in intervals, a hidden state."""
+    return candidate.free.keys() == {candidate.amplitude}
+
+
 def states_alone(fit: Fit) -> bool:
-    """Whether all that is on in intervals is a hidden state, whose size alone is free."""
-    events = [c for c in fit.candidates if in_intervals(effect_of(c.effect), c)]
-    return all(c.free.keys() == {c.amplitude} for c in events)
+    """Whether all that is on in intervals is a hidden state."""
+    return all(only_size_free(c) for c in fit.candidates if in_intervals(effect_of(c.effect), c))
 
 
 def leaves_unnamed(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
