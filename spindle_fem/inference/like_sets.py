@@ -90,9 +90,11 @@ def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
     """Sets, a third effect beside two that fit less probable where held-out readings doubt it.
 
     Two that fit within the errors leave those of their laws, which a third may fit: its odds are lowered by
-    what held-out readings lack of twenty to one for it.
+    what held-out readings lack of twenty to one for it. Together the two and all their thirds keep their
+    probability.
     """
-    shares = {item.fit.named_keys: item.probability for item in ranked}
+    doubted = dict.fromkeys((item.fit.named_keys for item in ranked), 1.0)
+    beside: dict[frozenset, list[Ranked]] = {}
     for item in ranked:
         pairs = [
             other
@@ -105,10 +107,14 @@ def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
             continue
         pair = min(pairs, key=lambda other: other.best.heldout)
         gain = 0.5 * (pair.best.heldout - item.best.heldout) / tuned.GAIN_DIVISOR
-        doubt = float(np.exp(min(0.0, gain - tuned.LEAST_HELDOUT_GAIN)))
-        third, two = shares[item.fit.named_keys], shares[pair.fit.named_keys]
-        lowered = (third + two) * third * doubt / max(third * doubt + two, np.finfo(float).tiny)
-        shares[item.fit.named_keys], shares[pair.fit.named_keys] = lowered, third + two - lowered
+        doubted[item.fit.named_keys] = float(np.exp(min(0.0, gain - tuned.LEAST_HELDOUT_GAIN)))
+        beside.setdefault(pair.fit.named_keys, [pair]).append(item)
+    shares = {item.fit.named_keys: item.probability for item in ranked}
+    for group in beside.values():
+        rest = sum(item.probability * doubted[item.fit.named_keys] for item in group)
+        scale = sum(item.probability for item in group) / max(rest, np.finfo(float).tiny)
+        for item in group:
+            shares[item.fit.named_keys] = item.probability * doubted[item.fit.named_keys] * scale
     found = [replace(item, probability=shares[item.fit.named_keys]) for item in ranked]
     return sorted(found, key=lambda item: -item.probability)
 

@@ -34,6 +34,21 @@ def test_a_third_beside_two_that_fit_within_the_errors_is_less_probable_where_he
     assert odds(0.0, more) == pytest.approx(2.0)
 
 
+def test_each_of_two_thirds_that_read_alike_is_doubted_once():
+    pair = replace(hypothesis(PRELOAD, CHURNING, misfit=400.0), heldout=500.0)
+    # One nat less than enough, so that each counts e times less beside the pair.
+    heldout = 500.0 - 2.0 * tuned.GAIN_DIVISOR * (tuned.LEAST_HELDOUT_GAIN - 1.0)
+    one, other = (
+        replace(hypothesis(PRELOAD, CHURNING, third, misfit=300.0), heldout=heldout)
+        for third in (OFFSET, replace(OFFSET, component="SP01"))
+    )
+    ranked = with_needed_thirds([Ranked(one, 0.5), Ranked(other, 0.4), Ranked(pair, 0.1)])
+    said = {id(item.best): item.probability for item in ranked}
+    assert sum(said.values()) == pytest.approx(1.0)
+    assert said[id(one)] / said[id(pair)] == pytest.approx(5.0 / np.e)
+    assert said[id(other)] / said[id(pair)] == pytest.approx(4.0 / np.e)
+
+
 def test_a_verdict_doubts_thirds_of_a_machine_that_is_drawn():
     nothing = replace(hypothesis(misfit=2000.0), heldout=900.0)
     pair = replace(hypothesis(PRELOAD, CHURNING, misfit=400.0), heldout=500.0)
