@@ -31,7 +31,7 @@ from spindle_fem.inference.missing_heat import (
     find_intervals,
     onset_answers,
 )
-from spindle_fem.inference.screening import Screened, amplitude_value, screen
+from spindle_fem.inference.screening import Screened, amplitude_to_begin_from, screen
 from spindle_fem.inference.worker_processes import FitOrder, Workers
 
 Array = NDArray[np.float64]
@@ -277,7 +277,8 @@ class Search:
         start = fit.values
         for variant, scaled in additions:
             factors = {item.name for item in variant.candidate.factors}
-            values = dict(variant.shape) | {variant.candidate.amplitude: amplitude_value(variant, scaled)}
+            amplitude = amplitude_to_begin_from(variant, scaled)
+            values = dict(variant.shape) | {variant.candidate.amplitude: amplitude}
             start |= {EFFECT_PREFIX + n if n in factors else n: v for n, v in values.items()}
             if id(variant.candidate) in intervals:
                 self.remember_cost(variant.candidate, intervals_cost(intervals[id(variant.candidate)]))

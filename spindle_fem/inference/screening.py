@@ -293,3 +293,14 @@ def amplitude_value(variant: Variant, scaled: float) -> float:
     else:
         value = candidate.null + scaled * (candidate.reference - candidate.null)
     return float(np.clip(value, item.low, item.high))
+
+
+def amplitude_to_begin_from(variant: Variant, scaled: float) -> float:
+    """Amplitude that a fit begins from, where the linearised problem has it so many times the reference.
+
+    The first order of a logarithm says nothing far off: a conductance of nothing has no slope to return by.
+    """
+    if variant.candidate.parameters[variant.candidate.amplitude].logarithmic:
+        most = tuned.FARTHEST_START * amplitude_spread(variant)
+        scaled = float(np.clip(scaled, -most, most))
+    return amplitude_value(variant, scaled)

@@ -143,6 +143,9 @@ IMPROVEMENT_ROUNDS = 2
 # Shares of the amplitudes that a fit begins from, until it can be simulated: friction that feeds on its own
 # heat has no steady state at amplitudes that the linearised problem overestimates.
 START_SHARES = (1.0, 0.5, 0.2)
+# Standard deviations of its prior within which a factor's logarithm begins: at five, usual factors (0.5) are
+# twelve times what they were or a twelfth, those of hardly known conductances (1.7) a five-thousandth.
+FARTHEST_START = 5.0
 # An interval that lies in gaps of the recording by more than this share explains what nobody recorded.
 MOST_IN_GAPS = 0.5
 

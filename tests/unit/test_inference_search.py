@@ -7,6 +7,7 @@ import pytest
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant
 from spindle_fem.inference.missing_heat import (
     Onsets,
@@ -17,7 +18,13 @@ from spindle_fem.inference.missing_heat import (
     shares,
     stretches,
 )
-from spindle_fem.inference.screening import Screened, amplitude_value, log_priors
+from spindle_fem.inference.screening import (
+    Screened,
+    amplitude_spread,
+    amplitude_to_begin_from,
+    amplitude_value,
+    log_priors,
+)
 
 STOP, COUNT = 14400.0, 40
 TIMES = np.linspace(0.0, STOP, COUNT + 1)[:-1]
@@ -160,6 +167,16 @@ def test_amplitudes_go_back_to_values(logarithmic):
     assert amplitude_value(item, 1.0) == pytest.approx(item.candidate.reference)
     assert amplitude_value(item, 2.0) == pytest.approx(2.25 if logarithmic else 1.0)
     assert amplitude_value(item, 100.0) == 3.0
+
+
+def test_a_factor_begins_no_further_off_than_its_prior_reaches():
+    item = Variant(candidate("x", logarithmic=True, value=1.0, low=0.0, high=np.inf), {})
+    farthest = tuned.FARTHEST_START * amplitude_spread(item)
+    assert amplitude_to_begin_from(item, 0.5) == amplitude_value(item, 0.5)
+    assert amplitude_to_begin_from(item, -5000.0) == pytest.approx(amplitude_value(item, -farthest))
+    assert amplitude_value(item, -5000.0) == 0.0  # where a logarithm would begin at minus infinity
+    straight = Variant(candidate("x", logarithmic=False, value=0.0, low=-1e6, high=1e6), {})
+    assert amplitude_to_begin_from(straight, 5000.0) == amplitude_value(straight, 5000.0)
 
 
 # ------------------------------------------------------------------ missing heat
