@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .asked import wilson
-from .score import coverage, first_right, matches, ranked_sets
+from .score import coverage, first_right, matches, ranked_sets, undecidable
 
 SURE = 0.9
 SEEN_OVER_NOISE = 3.0
@@ -66,6 +66,13 @@ def states_of(folder: Path, diagnosis: dict[str, Any]) -> list[tuple[float, floa
 def accepted(answer: dict[str, Any]) -> dict[str, Any]:
     """The answer with sets that count as right; nothing found, for a consistent machine."""
     return answer if answer["acceptable_sets"] else answer | {"acceptable_sets": [[]]}
+
+
+def must_be_told(answer: dict[str, Any]) -> bool:
+    """Whether what an undecidable case is mistaken for is not as faint as what may be left unsaid."""
+    if answer.get("indistinguishable"):
+        return undecidable(answer)
+    return [] not in answer["acceptable_sets"]
 
 
 def family_of(answer: dict[str, Any]) -> str:
@@ -120,7 +127,9 @@ def score_row(answer: dict[str, Any], diagnosis: dict[str, Any], folder: Path) -
         and probability > SURE
         and not first
         and diagnosis["verdict"] != "ambiguous",
-        "called_undecidable": diagnosis["verdict"] == "ambiguous" and rank is not None,
+        "called_undecidable": diagnosis["verdict"] == "ambiguous" and rank is not None
+        if must_be_told(answer)
+        else None,
         "place": all(f in here for f in found if f["effect"] in {e["effect"] for e in answer["effects"]})
         if any(f["effect"] in {e["effect"] for e in answer["effects"]} for f in found)
         else None,

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from validation.score_families import figures, score_study, summary
+from validation.score_families import figures, must_be_told, score_study, summary
 
 
 def answer(name, effects, verdict="missing_physics"):
@@ -87,6 +87,16 @@ def test_figures_by_family(rows):
         {"share": 0.0, "of": 1, "low": 0.0, "high": 0.73}, abs=0.01
     )
     assert found["all"]["confident_wrong"]["share"] == 0.25
+
+
+def test_what_is_too_faint_to_be_named_is_not_asked_to_be_called_undecidable():
+    seen = answer("case_0001", [HIDDEN], "ambiguous")
+    assert must_be_told(seen)
+    assert not must_be_told(seen | {"acceptable_sets": [*seen["acceptable_sets"], []]})
+    # What is known to read alike says which member it is in the stead of.
+    twin = seen | {"indistinguishable": [{"effect": "heat_scale", "component": "oil"}]}
+    assert must_be_told(twin)
+    assert not must_be_told(twin | {"acceptable_sets": [*seen["acceptable_sets"], []]})
 
 
 def test_nothing_to_count_gives_no_share():
