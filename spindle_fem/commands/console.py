@@ -44,12 +44,12 @@ def _print_warnings(console: Console, content: dict[str, Any]) -> None:
         _print_marked(console, warning["code"], f": {warning['text']}", "yellow")
 
 
-def headed_table(title: str, *columns: str) -> Table:
-    """An empty table: the first column names the rows, others hold numbers."""
+def headed_table(title: str, *columns: str, sentences: bool = False) -> Table:
+    """An empty table: the first column names the rows, in lines that may break; others hold numbers."""
     table = Table(
         title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
     )
-    table.add_column(columns[0], no_wrap=True)
+    table.add_column(columns[0], no_wrap=not sentences)
     for column in columns[1:]:
         table.add_column(column, justify="right")
     return table
@@ -246,7 +246,7 @@ def print_simulation(content: dict[str, Any], folder: Path) -> None:
 
 def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
     """Verdict, findings, alternatives and the fit before and after."""
-    from spindle_fem.report.diagnosis_words import level
+    from spindle_fem.report.diagnosis_words import fit_rows, level
 
     console = open_console()
     mismatch, fit = content["mismatch"], content["fit"]
@@ -257,17 +257,15 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
         lead = "Comes nearest: " if content["verdict"] == "unexplained" else ""
         console.print(f"{lead}{finding['statement']}  (set: {content['set_probability']:.2f})")
     if content["alternatives"]:
-        table = headed_table("Not ruled out", "set", "probability")
+        table = headed_table("Not ruled out", "set", "probability", sentences=True)
         for item in content["alternatives"]:
             names = " + ".join(f"{f['effect']} at {f['component']}" for f in item["findings"])
             table.add_row(names or "nothing", _number(item["probability"], 3))
         console.print(table)
     if fit["noise_K"] is not None:
         table = headed_table("Fit", "", "fitted K", "held out K")
-        for name in ("before", "after"):
-            table.add_row(
-                name, _number(fit[name]["train_rmse_K"], 3), _number(fit[name]["heldout_rmse_K"], 3)
-            )
+        for row in fit_rows(fit):
+            table.add_row(row["model"], _number(row["fitted"], 3), _number(row["heldout"], 3))
         full = fit["full_model"]
         for name in ("before", "after") if full["reason"] is None else ():
             errors = (full[name]["train_rmse_K"], full[name]["heldout_rmse_K"])
@@ -290,8 +288,7 @@ def print_plan(content: dict[str, Any], folder: Path) -> None:
         console.print(sentence)
     hours = f"Tests of {content['best_test']['length_s'] / 3600.0:.3g} h" if content["best_test"] else ""
     for key, title in (("sensors_in_turn", "Further sensors, one after another"), ("tests", hours)):
-        table = headed_table(title, "", "information bit", "seen", "told from all")
-        table.columns[0].no_wrap = False
+        table = headed_table(title, "", "information bit", "seen", "told from all", sentences=True)
         for item in content[key]:
             table.add_row(
                 item["words"],

@@ -22,6 +22,7 @@ from spindle_fem.parallel import WorkerPool
 from spindle_fem.recordings.manifest import find_manifest, load_manifest
 from spindle_fem.recordings.recording_folder import recordings_in
 from spindle_fem.report.diagnoses_report import DIAGNOSES, DIAGNOSES_SCHEMA, write_diagnoses_report
+from spindle_fem.report.diagnosis_words import heldout_errors
 from spindle_fem.results.output_folder import is_complete, output_folder, replace_text
 from spindle_fem.results.run_log import LOGGER
 from spindle_fem.studies.sweep.results_table import FAILED, OK, ResultTable, Row
@@ -182,12 +183,13 @@ def _diagnosed(order: FolderOrder, recording: Path, folder: Path) -> Row:
 def _cells(content: Mapping[str, Any]) -> Row:
     """Cells from the result of a diagnosis."""
     fit = content["fit"]
+    before, after, _ = heldout_errors(fit)
     return {
         "verdict": content["verdict"],
         "findings": "; ".join(f"{item['effect']} @ {item['component']}" for item in content["findings"]),
         "probability": content.get("set_probability"),
-        "before_rmse_K": fit["before"]["heldout_rmse_K"],
-        "after_rmse_K": fit["after"]["heldout_rmse_K"],
+        "before_rmse_K": before,
+        "after_rmse_K": after,
         "noise_K": fit["noise_K"],
         "status": OK,
         "reason": content["reason"],

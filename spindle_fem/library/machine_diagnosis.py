@@ -14,6 +14,7 @@ from spindle_fem.library.loaded_machine import Machine, Progress, definition_fil
 from spindle_fem.recordings.align import Recording
 from spindle_fem.report.diagnosis_charts import residual_map
 from spindle_fem.report.diagnosis_odds import set_probabilities
+from spindle_fem.report.diagnosis_words import heldout_errors
 from spindle_fem.report.read_against_predicted import before_after, displaced_before_after
 
 if TYPE_CHECKING:
@@ -84,9 +85,10 @@ class MachineDiagnosis(FolderResult):
         found |= {
             f"probability {n}": f"{item['probability']:.2f}" for n, item in enumerate(self["findings"], 1)
         }
-        errors = [self["fit"][when]["heldout_rmse_K"] for when in ("before", "after")]
-        if None not in errors:
-            found["error on held-out readings"] = f"{errors[0]:.3f} K, then {errors[1]:.3f} K"
+        before, after, told = heldout_errors(self["fit"])
+        if before is not None and after is not None:
+            then = f"{after:.3f} K" + (f", {told}" if told else "")
+            found["error on held-out readings"] = f"{before:.3f} K, then {then}"
         return found
 
 

@@ -10,7 +10,9 @@ from spindle_fem.effects.framework.effect import capital
 from spindle_fem.report.block_page import Cards, Notice, Table, Text
 from spindle_fem.report.diagnosis_words import (
     chance,
+    fit_rows,
     found_words,
+    heldout_errors,
     kelvin,
     level,
     moment,
@@ -30,6 +32,7 @@ _FROM_TO = (
 def cards(content: Mapping[str, Any]) -> Cards:
     """Headline numbers."""
     fit, mismatch = content["fit"], content["mismatch"]
+    before, after, told = heldout_errors(fit)
     items = [
         {"value": content["verdict"].replace("_", " "), "name": "verdict"},
         {"value": level(mismatch["p_value"]).removeprefix("= "), "name": "p, if nothing were missing"},
@@ -43,8 +46,8 @@ def cards(content: Mapping[str, Any]) -> Cards:
         )
     items += [
         {
-            "value": f"{kelvin(fit['before']['heldout_rmse_K'])} → {kelvin(fit['after']['heldout_rmse_K'])}",
-            "name": "held-out error, before → after",
+            "value": f"{kelvin(before)} → {kelvin(after)}",
+            "name": f"held-out error, before → after{f', {told}' if told else ''}",
         },
         {"value": kelvin(fit["noise_K"]), "name": "noise of a reading"},
     ]
@@ -55,15 +58,15 @@ def fit_table(content: Mapping[str, Any]) -> Table:
     """Errors before and after, on fitted and held-out readings."""
     fit = content["fit"]
     fields = (
-        words("model", str),
-        fixed("fitted readings / K", lambda model: fit[model]["train_rmse_K"], 3),
-        fixed("held-out readings / K", lambda model: fit[model]["heldout_rmse_K"], 3),
+        words("model", "model"),
+        fixed("fitted readings / K", "fitted", 3),
+        fixed("held-out readings / K", "heldout", 3),
     )
     caption = (
         f"Root mean square error over all temperature channels; held out: {fit['heldout']}. "
         f"Noise of a reading: {kelvin(fit['noise_K'])}."
     )
-    return table_of(fields, ("before", "after"), caption)
+    return table_of(fields, fit_rows(fit), caption)
 
 
 def misdescription_blocks(content: Mapping[str, Any]) -> list[Table | Text]:

@@ -193,14 +193,39 @@ def _heat_words(content: Mapping[str, Any]) -> str:
     )
 
 
+def heldout_errors(fit: Mapping[str, Any]) -> tuple[float | None, float | None, str]:
+    """Held-out errors before and after, K, and what the second one is told besides; empty without.
+
+    No fitted reading tells when a state switched or a level changed within a held-out stretch: all readings
+    tell that, and the fit says how much.
+    """
+    after = fit["after"]
+    told = after.get("heldout_states_told_rmse_K")
+    if told is None:
+        return fit["before"]["heldout_rmse_K"], after["heldout_rmse_K"], ""
+    return fit["before"]["heldout_rmse_K"], told, "its moments told by all readings"
+
+
+def fit_rows(fit: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Errors before and after of fitted and held-out readings, K: ``model``, ``fitted``, ``heldout``."""
+    rows = [
+        {"model": when, "fitted": fit[when]["train_rmse_K"], "heldout": fit[when]["heldout_rmse_K"]}
+        for when in ("before", "after")
+    ]
+    _, after, told = heldout_errors(fit)
+    if told:
+        rows.append({"model": f"after, {told}", "fitted": None, "heldout": after})
+    return rows
+
+
 def _improvement(fit: Mapping[str, Any]) -> str:
-    before, after = fit["before"]["heldout_rmse_K"], fit["after"]["heldout_rmse_K"]
+    before, after, told = heldout_errors(fit)
     if before is None or after is None:
         return ""
     verb = "falls" if after < before else "goes"
     return (
-        f"With it the held-out error {verb} from {kelvin(before)} to {kelvin(after)}; "
-        f"noise {kelvin(fit['noise_K'])}."
+        f"With it{f', {told},' if told else ''} the held-out error {verb} from {kelvin(before)} to "
+        f"{kelvin(after)}; noise {kelvin(fit['noise_K'])}."
     )
 
 

@@ -62,6 +62,33 @@ def test_findings_of_a_verdict_without_explanation_are_no_statements(verdict, ca
     assert ("Comes nearest: 312 W" in capsys.readouterr().out) == unexplained
 
 
+def test_what_switches_is_held_against_readings_that_tell_when(capsys):
+    told = content("missing_physics")
+    assert "With it the held-out error falls from 0.56 K to 0.24 K" in verdict_sentence(told)
+    told["fit"]["after"] = {
+        "train_rmse_K": 0.186,
+        "heldout_rmse_K": 0.571,
+        "heldout_states_told_rmse_K": 0.21,
+    }
+    words = "its moments told by all readings"
+    assert f"With it, {words}, the held-out error falls from 0.56 K to 0.21 K" in verdict_sentence(told)
+    assert {"value": "0.56 K → 0.21 K", "name": f"held-out error, before → after, {words}"} in cards(
+        told
+    ).items
+    rows = [row["cells"] for row in fit_table(told).rows]
+    assert rows[1:] == [["after", "0.186", "0.571"], [f"after, {words}", "–", "0.210"]]
+    print_diagnosis(told, Path())
+    assert f"after, {words}" in capsys.readouterr().out
+
+
+def test_probabilities_are_shown_beside_sets_of_long_names(capsys):
+    told = content("missing_physics")
+    finding = told["findings"][0] | {"component": "milling_spindle|room"}
+    told["alternatives"] = [{"findings": [finding] * 3, "probability": 0.123}]
+    print_diagnosis(told, Path())
+    assert "0.123" in capsys.readouterr().out
+
+
 def test_one_set_that_is_doubted_is_not_told_apart_from_others():
     told = content("ambiguous") | {"reason": "something else is likelier than the best set"}
     sentence = verdict_sentence(told)
