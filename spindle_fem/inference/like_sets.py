@@ -131,7 +131,7 @@ def likeliest_first(ranked: Sequence[Ranked], overlapping: Mapping[str, frozense
 def without_repeats(ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], float]) -> list[Ranked]:
     """Sets without those whose law only repeats that of another, which gets their probability.
 
-    A gap that closes with temperature is a contact that conducts less at an end of its values. Where both
+    A gap that closes with temperature is, at some of its values, a contact that conducts less. Where both
     read the same within a tenth of the noise, or the gap makes the readings no likelier, they say the same,
     one of them with fewer values.
     """

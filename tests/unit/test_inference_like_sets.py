@@ -173,12 +173,19 @@ def test_heat_of_one_law_at_two_spots_is_one_set_named_at_the_larger():
     assert not are_alike(one, other, {})
 
 
-def test_a_law_that_only_repeats_a_constant_one_at_its_place_is_no_rival():
-    joint = candidate("joint_conductance", "a|b", kind="parameter")
-    nothing, constant = hypothesis(misfit=1400.0), hypothesis(joint, CHURNING, misfit=401.0)
+@pytest.mark.parametrize(
+    ("law", "constant_law"),
+    [
+        ("gap_closure", "joint_conductance"),
+        *((law, "heat_scale") for law in ("drive_heat", "seal_friction", "grease_churning")),
+    ],
+)
+def test_a_law_that_only_repeats_a_constant_one_at_its_place_is_no_rival(law, constant_law):
+    plain = candidate(constant_law, "a|b", kind="parameter")
+    nothing, constant = hypothesis(misfit=1400.0), hypothesis(plain, CHURNING, misfit=401.0)
 
     def found(place, distance, misfit=400.0):
-        rich = hypothesis(candidate("gap_closure", place), CHURNING, misfit=misfit)
+        rich = hypothesis(candidate(law, place), CHURNING, misfit=misfit)
         near = distance * tuned.SAME_READINGS
         return rich, verdict(nothing, rich, constant, calibrated=True, apart=lambda *_: near)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from spindle_fem.effects.catalogue.heat_scale import HeatScale
 from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.framework.laws import RPM
@@ -24,6 +25,7 @@ class DriveHeat(Effect):
 
     name = "drive_heat"
     kind = "missing_physics"
+    repeats = HeatScale.name
     title = "heat from the motor, belt or gear reaches the drive end"
     check = (
         "Belt tension and pulley temperature, coupling, motor flange: compare their temperatures with the "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.catalogue.heat_scale import HeatScale
 from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect
 from spindle_fem.effects.framework.laws import (
@@ -99,6 +100,7 @@ class GreaseChurning(Effect):
 
     name = "grease_churning"
     kind = "missing_physics"
+    repeats = HeatScale.name
     title = "extra friction that fades with running time, as of grease not yet distributed"
     check = (
         "Lubrication record: was the set refilled, overfilled or long at rest? Run the grease in step by "

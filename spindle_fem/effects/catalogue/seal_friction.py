@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from spindle_fem.effects.catalogue.heat_scale import HeatScale
 from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, place_words, quantity
 from spindle_fem.effects.framework.laws import RPM
@@ -28,6 +29,7 @@ class SealFriction(Effect):
 
     name = "seal_friction"
     kind = "missing_physics"
+    repeats = HeatScale.name
     title = "a seal rubs: heat in proportion to speed"
     check = (
         "Seal lip or labyrinth for contact marks, wear dust, misalignment and excess grease; turn the "

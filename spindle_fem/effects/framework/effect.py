@@ -248,7 +248,9 @@ class Effect(ABC):
     delays : bool
         Whether its amplitude is a time by which a channel is late, as that of every sensor is by a little.
     repeats : str
-        Effect that its law is, at the same place, at an end of its values; empty for none.
+        Effect that its law is, at the same place, at some of its values; empty for none. (A gap that is
+        closed conducts as a contact; churning that never ends, or heat by the power of speed that a node's
+        own heat follows, is a factor on that heat.)
     """
 
     name: str
