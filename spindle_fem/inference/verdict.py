@@ -229,7 +229,7 @@ def judge(
     coarseness : float
         As :func:`tempered` has it.
     """
-    before = rank(hypotheses, coarseness)
+    before, every = rank(hypotheses, coarseness), hypotheses
     if coarseness > 1.0:
         hypotheses = that_leave_least(with_needed_events(hypotheses, left, beyond), left, beyond)
     ranked = rank(hypotheses, coarseness)
@@ -314,8 +314,9 @@ def judge(
         and apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
     ]
     evidence = alike.probability
-    share = share_of_last(hypotheses, chosen.best)
-    more = gain_of_more(hypotheses, chosen.best)
+    # How reliable a set is depends on all that were fitted, those given up among them.
+    share = share_of_last(every, chosen.best)
+    more = gain_of_more(every, chosen.best)
     exact = (1.0 - nothing) * (1.0 - inexact)
     known = exact * reliable(evidence, share, more) / evidence
     alternatives = tuple(

@@ -148,6 +148,16 @@ def test_one_effect_more_must_lower_what_a_network_leaves_of_fitted_and_of_held_
     assert found(little, little, of_one=2.2) == two.keys
 
 
+def test_what_the_sets_given_up_gain_makes_the_named_one_less_reliable():
+    null, one = hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=900.0)
+    two = hypothesis(PRELOAD, CHURNING, misfit=400.0)
+    left = dict.fromkeys(("left", "beyond"), lambda fit: 1.2 if fit.candidates else 9.0)
+    alone, beside = (verdict(*sets, coarseness=2.0, **left) for sets in ((null, one), (null, one, two)))
+    assert alone.chosen.fit.keys == beside.chosen.fit.keys == one.keys
+    assert (alone.gain_of_more, beside.gain_of_more) == (0.0, 250.0)
+    assert beside.chosen.probability < alone.chosen.probability
+
+
 def test_what_is_likely_but_leaves_more_is_listed_with_a_share_of_what_is_left():
     null, likely = hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=400.0)
     exact = hypothesis(OFFSET, misfit=480.0)
