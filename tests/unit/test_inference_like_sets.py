@@ -178,6 +178,7 @@ def test_heat_of_one_law_at_two_spots_is_one_set_named_at_the_larger():
     [
         ("gap_closure", "joint_conductance"),
         *((law, "heat_scale") for law in ("drive_heat", "seal_friction", "grease_churning")),
+        ("sensor_detached", "sensor_lag"),
     ],
 )
 def test_a_law_that_only_repeats_a_constant_one_at_its_place_is_no_rival(law, constant_law):

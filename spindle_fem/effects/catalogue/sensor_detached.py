@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.effects.catalogue.sensor_lag import SensorLag
 from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Array, Candidate, Reading, Reported
 from spindle_fem.effects.framework.filters import first_order_lag
@@ -93,6 +94,7 @@ class SensorDetached(SensorEffect):
     """A sensor that has lost its contact reads a mix of the part and the air."""
 
     name = "sensor_detached"
+    repeats = SensorLag.name
     title = "the sensor has come off and reads partly the air"
     check = (
         "Is the sensor still in its bore or glued on? Pull gently at the cable; look at the clamp and "

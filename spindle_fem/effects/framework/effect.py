@@ -250,7 +250,7 @@ class Effect(ABC):
     repeats : str
         Effect that its law is, at the same place, at some of its values; empty for none. (A gap that is
         closed conducts as a contact; churning that never ends, or heat by the power of speed that a node's
-        own heat follows, is a factor on that heat.)
+        own heat follows, is a factor on that heat; a sensor that hardly reads the air is late.)
     """
 
     name: str
