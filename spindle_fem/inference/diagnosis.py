@@ -37,9 +37,10 @@ from spindle_fem.inference.prepared_problem import (
 )
 from spindle_fem.inference.search_basis import smaller_predictors
 from spindle_fem.inference.search_course import run_search
+from spindle_fem.inference.set_odds import rank
 from spindle_fem.inference.set_problems import SetProblems, combination_of
 from spindle_fem.inference.state_search import InferredState, inferred_states, states_on_rows
-from spindle_fem.inference.verdict import Judgement, judge, rank
+from spindle_fem.inference.verdict import Judgement, judge
 from spindle_fem.inference.worker_processes import Workers
 from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
 from spindle_fem.parallel import thread_count

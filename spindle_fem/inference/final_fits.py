@@ -15,8 +15,8 @@ from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.like_sets import free_in_time, may_stand_for
 from spindle_fem.inference.other_answers import with_other_answers
+from spindle_fem.inference.set_odds import tempered
 from spindle_fem.inference.set_problems import SetProblems, combination_of
-from spindle_fem.inference.verdict import tempered
 from spindle_fem.inference.worker_processes import FitOrder, Workers, of_candidates
 
 

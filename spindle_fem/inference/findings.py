@@ -15,10 +15,10 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.calibration import LEVEL
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
+from spindle_fem.inference.hypothesis import Ranked
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.other_answers import draws_of
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.verdict import Ranked
 
 Array = NDArray[np.float64]
 

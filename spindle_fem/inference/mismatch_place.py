@@ -17,7 +17,8 @@ from spindle_fem.inference.hypothesis_fit import Fit, candidate_coordinates
 from spindle_fem.inference.missing_heat import Explanation, shares, stretches
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError
-from spindle_fem.inference.verdict import counted, kind_of
+from spindle_fem.inference.set_odds import counted
+from spindle_fem.inference.verdict import kind_of
 from spindle_fem.machine.view.meridian_places import centre_of
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.conditions import Conditions, operating_conditions

@@ -38,9 +38,10 @@ from spindle_fem.inference.further_tests import (
     unread_displacements,
 )
 from spindle_fem.inference.growth_misdescriptions import EXPANSION_SIGMA
+from spindle_fem.inference.hypothesis import Ranked
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit
 from spindle_fem.inference.reading_noise import SlowError
-from spindle_fem.inference.verdict import Ranked, rank
+from spindle_fem.inference.set_odds import rank
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:

@@ -57,7 +57,7 @@ def heldout_p_value(chosen: Hypothesis, null: Hypothesis, coarseness: float = 1.
     """Bound of that probability by held-out readings, for a set that fitted ones chose; 1 without any.
 
     Where nothing is missing, a likelihood of readings to come is x times that which they have once in x times
-    at most, by Markov's inequality. Gains count as :func:`~spindle_fem.inference.verdict.tempered` has them.
+    at most, by Markov's inequality. Gains count as :func:`~spindle_fem.inference.set_odds.tempered` has them.
     Source: Robbins (1970), Ann. Math. Statist. 41, 1397-1409.
     """
     if chosen.heldout is None or null.heldout is None:

@@ -14,7 +14,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.coarse_sets import that_leave_least, with_needed_events
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked
-from spindle_fem.inference.hypothesis_fit import Fit, amplitude_name
+from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.like_sets import (
     are_alike,
     as_one,
@@ -28,6 +28,7 @@ from spindle_fem.inference.like_sets import (
 )
 from spindle_fem.inference.p_value import detection_p_value, heldout_p_value
 from spindle_fem.inference.reliability import gain_of_more, reliable, share_of_last
+from spindle_fem.inference.set_odds import rank
 
 Verdict = Literal["consistent", "parameter", "sensor", "missing_physics", "ambiguous", "unexplained"]
 
@@ -79,96 +80,6 @@ class Judgement:
     left: float = 0.0
 
 
-def rank(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[Ranked]:
-    """Probabilities of sets of effects at places, forms added up, the most probable first.
-
-    ``coarseness`` as :func:`tempered` has it.
-    """
-    groups: dict[frozenset, list[tuple[float, Hypothesis]]] = {}
-    for item, score in zip(hypotheses, tempered(hypotheses, coarseness), strict=True):
-        groups.setdefault(item.fit.named_keys, []).append((score, item))
-    highest = max(score for group in groups.values() for score, _ in group)
-    weights = {
-        key: float(sum(np.exp(score - highest) for score, _ in group)) for key, group in groups.items()
-    }
-    total = sum(weights.values())
-    found = [
-        Ranked(max(group, key=lambda pair: pair[0])[1], weights[key] / total) for key, group in groups.items()
-    ]
-    return sorted(found, key=lambda item: -item.probability)
-
-
-def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[float]:
-    """Logarithm of prior, complexity and likelihood over nothing missing, the last as far as it counts.
-
-    Complexity (the determinants of Laplace's evidence) counts in full, with
-    amplitudes that may have any order of magnitude (:func:`any_magnitude`). Held-out readings, where all sets
-    have them, are readings like the fitted ones: what a set gains there counts as much.
-
-    Parameters
-    ----------
-    hypotheses : sequence of Hypothesis
-        The empty one among them.
-    coarseness : float
-        How many times less a gain counts between sizes than on a machine that is drawn; between sets of one
-        size, which share some of what a coarse model leaves, its square root.
-    """
-    in_a_size = tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness))
-    null = next(h for h in hypotheses if not h.fit.candidates)
-    gains = [null.misfit - h.misfit for h in hypotheses]
-    if all(h.heldout is not None for h in hypotheses):
-        gains = [gain + null.heldout - h.heldout for gain, h in zip(gains, hypotheses, strict=True)]
-    gains = [0.5 * h.course_kept(coarseness) * gain for gain, h in zip(gains, hypotheses, strict=True)]
-    # Within a size; the best set of a size is then compared with other sizes.
-    scores = [
-        float(
-            h.log_prior
-            + h.fit.log_evidence
-            + 0.5 * h.fit.misfit_with_prior
-            + any_magnitude(h.fit)
-            + gain / in_a_size
-        )
-        for h, gain in zip(hypotheses, gains, strict=True)
-    ]
-    best: dict[int, int] = {}
-    for index, item in enumerate(hypotheses):
-        size = len(item.fit.candidates)
-        if size not in best or scores[index] > scores[best[size]]:
-            best[size] = index
-    less = {
-        size: counted(gains[index]) / (coarseness * tuned.GAIN_DIVISOR) - gains[index] / in_a_size
-        for size, index in best.items()
-    }
-    return [score + less[len(item.fit.candidates)] for item, score in zip(hypotheses, scores, strict=True)]
-
-
-def any_magnitude(fit: Fit) -> float:
-    """Logarithm of the prior density of a fit's amplitudes, even in their logarithm, over the normal one.
-
-    Two effects that leave the same then have the same complexity, whatever widths
-    their priors were given. What is less than ``SEEN_FROM`` of its own standard
-    deviations counts as that large, so that a small fitted amplitude is no
-    evidence for its effect.
-    """
-    width = np.sqrt(2.0 * np.pi) / (2.0 * np.log(1.0 / tuned.SMALLEST_SIZE))
-    places = {c.name: index for index, c in enumerate(fit.coordinates)}
-    found = 0.0
-    for candidate in fit.candidates:
-        place = places[amplitude_name(candidate)]
-        least = tuned.SEEN_FROM * float(np.sqrt(fit.covariance[place, place]))
-        size = max(abs(fit.position[place]), least)
-        found += float(np.log(width / np.clip(size, tuned.SMALLEST_SIZE, 1.0)))
-    return found
-
-
-def counted(gain: float) -> float:
-    """Gain of likelihood that counts: all of it while small, a quarter of the excess later."""
-    ends = tuned.INEXACT_BEYOND * (tuned.LARGEST_INEXACT_DIVISOR - 1.0)
-    inside = min(max(gain, 0.0), ends)
-    beyond = max(gain - ends, 0.0) / tuned.LARGEST_INEXACT_DIVISOR
-    return float(tuned.INEXACT_BEYOND * np.log1p(inside / tuned.INEXACT_BEYOND) + beyond + min(gain, 0.0))
-
-
 def within_prior(fit: Fit, calibrated: bool) -> bool:
     """Whether every candidate is a shift of a parameter that the definition's prior still holds."""
     if calibrated or not fit.candidates:
@@ -194,6 +105,54 @@ def kind_of(candidates: Sequence[Candidate]) -> Verdict:
         if kind in kinds:
             return kind
     return "consistent"
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What is asked of fits and of the machine, as :func:`judge` takes it."""
+
+    calibrated: bool
+    overlapping: Mapping[str, frozenset[str]]
+    apart: Callable[[Fit, Fit], float]
+    left: Callable[[Fit], float]
+    beyond: Callable[[Fit], float]
+    coarseness: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Weighed:
+    """Fitted sets, and what decides between them.
+
+    Attributes
+    ----------
+    every : sequence of Hypothesis
+        All that were fitted, those given up among them.
+    before : list of Ranked
+        By all readings, before any was given up.
+    by_fitted : mapping of keys to Ranked
+        By fitted readings alone.
+    by_all : mapping of keys to float
+        Probability by all readings, before like sets count as one and thirds are doubted.
+    ranked : list of Ranked
+        The set that is named, or nothing missing, in front.
+    empty : Ranked
+        Nothing missing.
+    p_value : float
+    """
+
+    every: Sequence[Hypothesis]
+    before: list[Ranked]
+    by_fitted: dict[frozenset, Ranked]
+    by_all: dict[frozenset, float]
+    ranked: list[Ranked]
+    empty: Ranked
+    p_value: float
+
+    def predicts(self, item: Ranked, asked: _Asked) -> bool:
+        """Whether held-out readings speak for a set."""
+        nothing = self.by_fitted[self.empty.fit.named_keys]
+        odds = _log_odds(self.by_fitted[item.fit.named_keys], nothing)
+        return _predicts(item.best, self.empty.best, asked, odds, self.p_value < tuned.RULED_OUT)
 
 
 def judge(
@@ -229,157 +188,150 @@ def judge(
     coarseness : float
         As :func:`tempered` has it.
     """
+    asked = _Asked(calibrated, overlapping or {}, apart, left, beyond, coarseness)
+    sets = _weighed(hypotheses, trials, asked)
+    chosen = sets.ranked[0]
+    named = sets.p_value <= tuned.SIGNIFICANT and bool(chosen.fit.candidates)
+    if named and sets.predicts(chosen, asked) and not within_prior(chosen.fit, calibrated):
+        return _named(sets, asked)
+    return _not_named(sets, asked)
+
+
+def _weighed(hypotheses: Sequence[Hypothesis], trials: int, asked: _Asked) -> _Weighed:
+    """Sets in the order in which they are told, and the p-value of nothing missing."""
+    coarseness, is_coarse = asked.coarseness, asked.coarseness > 1.0
     before, every = rank(hypotheses, coarseness), hypotheses
-    if coarseness > 1.0:
-        hypotheses = that_leave_least(with_needed_events(hypotheses, left, beyond), left, beyond)
+    if is_coarse:
+        hypotheses = with_needed_events(hypotheses, asked.left, asked.beyond)
+        hypotheses = that_leave_least(hypotheses, asked.left, asked.beyond)
     ranked = rank(hypotheses, coarseness)
-    p_value = detection_p_value(hypotheses, trials, coarseness)
     empty = next(item for item in ranked if not item.fit.candidates)
     by_fitted = rank([replace(h, heldout=None) for h in hypotheses], coarseness)
-    fitted = {i.fit.named_keys: i for i in by_fitted}
+    p_value = detection_p_value(hypotheses, trials, coarseness)
     likeliest = next((i.fit for i in by_fitted if i.fit.candidates), None)
     if likeliest is not None:
         first = next(h for h in hypotheses if h.fit is likeliest)
         p_value = min(p_value, heldout_p_value(first, empty.best, coarseness))
-    odds = {keys: _log_odds(item, fitted[empty.fit.named_keys]) for keys, item in fitted.items()}
-    nothing = 0.0
     # A coarse machine leaves errors of its own, which no p-value knows: what is likelier than all sets stays,
     # unless it leaves more than may be left.
-    little = max(left(empty.fit), beyond(empty.fit)) <= tuned.MOST_LEFT
-    stays = coarseness > 1.0 and empty.probability > tuned.STILL_POSSIBLE and little
+    little = max(asked.left(empty.fit), asked.beyond(empty.fit)) <= tuned.MOST_LEFT
+    stays = is_coarse and empty.probability > tuned.STILL_POSSIBLE and little
     if p_value <= tuned.SIGNIFICANT and not stays:
         ranked = _without(ranked, empty)
     by_all = {item.fit.named_keys: item.probability for item in ranked}
-    if coarseness == 1.0:
-        ranked = with_needed_thirds(ranked)
-    ranked = likeliest_first(without_repeats(ranked, apart), overlapping or {})
-    chosen = ranked[0]
-    if tuned.RULED_OUT <= p_value <= tuned.SIGNIFICANT:
-        nothing = min(empty.probability, tuned.STILL_POSSIBLE)
+    told = ranked if is_coarse else with_needed_thirds(ranked)
+    told = likeliest_first(without_repeats(told, asked.apart), asked.overlapping)
+    return _Weighed(
+        every, before, {item.fit.named_keys: item for item in by_fitted}, by_all, told, empty, p_value
+    )
 
-    def predicts(item: Ranked) -> bool:
-        ruled_out = p_value < tuned.RULED_OUT
-        return _predicts(
-            item.best, empty.best, left, beyond, coarseness, odds[item.fit.named_keys], ruled_out
-        )
 
-    improved, kept = predicts(chosen), ranked
-    if chosen.fit.candidates and not improved:
+def _not_named(sets: _Weighed, asked: _Asked) -> Judgement:
+    """No set is named: the recording is consistent, or what it contradicts is not explained."""
+    chosen, kept, empty = sets.ranked[0], sets.ranked, sets.empty
+    if chosen.fit.candidates and not sets.predicts(chosen, asked):
         # What does not tell held-out readings is given up: nothing missing has its probability.
-        kept = [i for i in ranked if i.fit.candidates and predicts(i)]
+        kept = [i for i in kept if i.fit.candidates and sets.predicts(i, asked)]
         empty = replace(empty, probability=1.0 - sum(i.probability for i in kept))
-    if (
-        p_value > tuned.SIGNIFICANT
-        or not (chosen.fit.candidates and improved)
-        or within_prior(chosen.fit, calibrated)
-    ):
-        nothing_left, misfit_left = left(empty.fit), float(np.sqrt(empty.fit.reduced_misfit))
-        much_left = misfit_left > tuned.UNEXPLAINED_MISFIT or nothing_left > tuned.MOST_LEFT
-        in_prior = within_prior(chosen.fit, calibrated)
-        # Where likelihoods hold, readings may contradict the model although no set tells held-out ones; not
-        # those that leave no more than their noise.
-        more_left = max(nothing_left, beyond(empty.fit)) > 1.0
-        contradicted = coarseness == 1.0 and bool(chosen.fit.candidates) and p_value < tuned.RULED_OUT
-        if not (much_left or (contradicted and more_left)) or (nothing_left <= tuned.MOST_LEFT and in_prior):
-            _, others = as_one([empty, *(i for i in kept if i.fit.candidates)], overlapping or {})
-            # What is less likely than nothing missing, but not ruled out.
-            listed = tuple(i for i in others if tuned.LISTED <= i.probability < empty.probability)
-            return Judgement("consistent", p_value, empty, listed, 0.0, "")
-        # The residual is there, and no set of the catalogue makes it likelier.
-        left_over, reason = p_value, CONTRADICTED_REASON
-        if much_left:
-            left_over = float(chi2.sf(empty.fit.misfit, len(empty.fit.residual)))
-            much = f"{nothing_left:.1f} times" if nothing_left > tuned.MOST_LEFT else "more than"
-            reason = f"the readings differ from the model by {much} the noise, and no effect explains it"
-        nothing_found = replace(empty, probability=0.0)
-        return Judgement("unexplained", left_over, nothing_found, (), 1.0, reason, left=nothing_left)
-    misfit = float(np.sqrt(chosen.fit.reduced_misfit))
+    left, misfit = asked.left(empty.fit), float(np.sqrt(empty.fit.reduced_misfit))
+    much_left = misfit > tuned.UNEXPLAINED_MISFIT or left > tuned.MOST_LEFT
+    in_prior = within_prior(chosen.fit, asked.calibrated)
+    # Where likelihoods hold, readings may contradict the model although no set tells held-out ones; not
+    # those that leave no more than their noise.
+    more_left = max(left, asked.beyond(empty.fit)) > 1.0
+    impossible = asked.coarseness == 1.0 and bool(chosen.fit.candidates) and sets.p_value < tuned.RULED_OUT
+    if not (much_left or (impossible and more_left)) or (left <= tuned.MOST_LEFT and in_prior):
+        _, others = as_one([empty, *(i for i in kept if i.fit.candidates)], asked.overlapping)
+        # What is less likely than nothing missing, but not ruled out.
+        listed = tuple(i for i in others if tuned.LISTED <= i.probability < empty.probability)
+        return Judgement("consistent", sets.p_value, empty, listed, 0.0, "")
+    # The residual is there, and no set of the catalogue makes it likelier.
+    p_value, reason = sets.p_value, CONTRADICTED_REASON
+    if much_left:
+        p_value = float(chi2.sf(empty.fit.misfit, len(empty.fit.residual)))
+        much = f"{left:.1f} times" if left > tuned.MOST_LEFT else "more than"
+        reason = f"the readings differ from the model by {much} the noise, and no effect explains it"
+    return Judgement("unexplained", p_value, replace(empty, probability=0.0), (), 1.0, reason, left=left)
+
+
+def _named(sets: _Weighed, asked: _Asked) -> Judgement:
+    """A set is named: how sure that is, what else is not ruled out, and whether it is decided."""
+    chosen, known_as_one = sets.ranked[0], asked.overlapping
+    nothing = 0.0
+    if tuned.RULED_OUT <= sets.p_value <= tuned.SIGNIFICANT:
+        nothing = min(sets.empty.probability, tuned.STILL_POSSIBLE)
+    misfit, rest = float(np.sqrt(chosen.fit.reduced_misfit)), asked.left(chosen.fit)
     inexact = float(np.clip((misfit - tuned.EXACT_MISFIT) / tuned.OTHER_RANGE, 0.0, tuned.LARGEST_OTHER))
-    rest = left(chosen.fit)
     # Held-out readings count by what is left of them beyond what is left of those that were fitted.
-    inexact = max(inexact, unexplained_share(rest), unexplained_share(beyond(chosen.fit) / max(1.0, rest)))
-    known_as_one = overlapping or {}
+    beyond = asked.beyond(chosen.fit) / max(1.0, rest)
+    inexact = max(inexact, unexplained_share(rest), unexplained_share(beyond))
     # Which bearing of a set it is does not matter for the decision; the best represents all.
-    alike, rivals = as_one(ranked, known_as_one)
-    # What held-out readings say of a rival is asked by itself.
-    by_fits = as_one(list(fitted.values()), known_as_one)
-    likely = [i.fit for i in (by_fits[0], *by_fits[1]) if i.probability >= tuned.NEAR_PROBABILITY]
-    near = [
-        item
-        for item in rivals
-        if any(are_alike(item.fit, fit, known_as_one) for fit in likely)
-        and may_stand_for(item.fit, chosen.fit, known_as_one)
-        and not leaves_unnamed(item.fit, chosen.fit, known_as_one)
-        and _told_by_readings(chosen.best, item.best, coarseness) < tuned.LEAST_HELDOUT_GAIN
-        and apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
-    ]
+    alike, rivals = as_one(sets.ranked, known_as_one)
+    near = _near(chosen, rivals, sets, asked)
     evidence = alike.probability
     # How reliable a set is depends on all that were fitted, those given up among them.
-    share = share_of_last(every, chosen.best)
-    more = gain_of_more(every, chosen.best)
+    share, more = share_of_last(sets.every, chosen.best), gain_of_more(sets.every, chosen.best)
     exact = (1.0 - nothing) * (1.0 - inexact)
     known = exact * reliable(evidence, share, more) / evidence
+    probability = known * evidence
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
         for item in rivals
         # A third effect that held-out readings doubt is listed.
-        if (known * max(item.probability, by_all[item.fit.named_keys]) >= tuned.LISTED or item in near)
+        if (known * max(item.probability, sets.by_all[item.fit.named_keys]) >= tuned.LISTED or item in near)
         and item.fit.candidates
     )
     # What a coarse machine gives up although it is likely shares what is left.
-    over = 1.0 - known * evidence - sum(item.probability for item in alternatives)
-    given_up = (Ranked(i.best, over * i.probability) for i in before if i.fit.named_keys not in by_all)
+    over = 1.0 - probability - sum(item.probability for item in alternatives)
+    given_up = [i for i in sets.before if i.fit.named_keys not in sets.by_all and i.fit.candidates]
     alternatives += tuple(
-        item for item in given_up if item.probability >= tuned.LISTED and item.fit.candidates
+        Ranked(i.best, over * i.probability) for i in given_up if over * i.probability >= tuned.LISTED
     )
     # What every likely set holds is sure, whether there is more or not.
-    common = sum(item.probability for item in ranked if holds(item.fit, chosen.fit, known_as_one))
+    common = sum(item.probability for item in sets.ranked if holds(item.fit, chosen.fit, known_as_one))
     several = common * (1.0 - nothing) < tuned.DECIDED or bool(near)
-    doubted = known * evidence < tuned.LIKELIER_RIGHT
-    kind = kind_of(chosen.fit.candidates)
+    doubted = probability < tuned.LIKELIER_RIGHT
+    verdict = kind_of(chosen.fit.candidates)
     # Where little is left, what is likelier than a doubted set is other physics, or a law unlike those known.
-    is_physics = kind == "missing_physics" and exact >= tuned.LIKELIER_RIGHT
-    decided = not several and (is_physics or not doubted)
-    if decided:
-        reason = DOUBTED_REASON if doubted else ""
-    elif nothing > 1.0 - tuned.DECIDED:
-        reason = NOTHING_REASON
-    elif several:
-        reason = NEAR_REASON if near else SEVERAL_REASON
-    else:
-        reason = DOUBTED_REASON
-    verdict: Verdict = kind if decided else "ambiguous"
+    is_physics = verdict == "missing_physics" and exact >= tuned.LIKELIER_RIGHT
+    reason = DOUBTED_REASON if doubted else ""
+    if several or not (is_physics or not doubted):
+        verdict = "ambiguous"
+        if nothing > 1.0 - tuned.DECIDED:
+            reason = NOTHING_REASON
+        elif several:
+            reason = NEAR_REASON if near else SEVERAL_REASON
     if rest > tuned.MOST_LEFT:
-        without = left(empty.fit)
+        without = asked.left(sets.empty.fit)
         verdict = "unexplained"
         reason = (
             f"the best set leaves {rest:.1f} times what the errors expected of sensors allow (noise with its "
             f"slow part, robust root mean square of fitted readings), where {without:.1f} times was left "
             f"without it: it explains {100.0 * (1.0 - (rest / without) ** 2):.0f} % of the mismatch"
         )
+    told = Ranked(chosen.best, probability)
     return Judgement(
-        verdict,
-        p_value,
-        Ranked(chosen.best, known * evidence),
-        alternatives,
-        1.0 - known,
-        reason,
-        evidence,
-        share,
-        more,
-        rest,
+        verdict, sets.p_value, told, alternatives, 1.0 - known, reason, evidence, share, more, rest
     )
 
 
-def _predicts(
-    chosen: Hypothesis,
-    empty: Hypothesis,
-    left: Callable[[Fit], float],
-    beyond: Callable[[Fit], float],
-    coarseness: float,
-    odds: float,
-    ruled_out: bool,
-) -> bool:
+def _near(chosen: Ranked, rivals: Sequence[Ranked], sets: _Weighed, asked: _Asked) -> list[Ranked]:
+    """Rivals whose readings are those of the chosen set within the noise."""
+    # What held-out readings say of a rival is asked by itself.
+    first, others = as_one(list(sets.by_fitted.values()), asked.overlapping)
+    likely = [item.fit for item in (first, *others) if item.probability >= tuned.NEAR_PROBABILITY]
+    return [
+        item
+        for item in rivals
+        if any(are_alike(item.fit, fit, asked.overlapping) for fit in likely)
+        and may_stand_for(item.fit, chosen.fit, asked.overlapping)
+        and not leaves_unnamed(item.fit, chosen.fit, asked.overlapping)
+        and _told_by_readings(chosen.best, item.best, asked.coarseness) < tuned.LEAST_HELDOUT_GAIN
+        and asked.apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
+    ]
+
+
+def _predicts(chosen: Hypothesis, empty: Hypothesis, asked: _Asked, odds: float, ruled_out: bool) -> bool:
     """Whether held-out readings speak for a set: by themselves, or with what the fitted ones say.
 
     They are a third of the fitted ones, and of a small effect seen by few sensors tell less than its odds by
@@ -392,8 +344,8 @@ def _predicts(
     """
     if chosen.heldout is None or empty.heldout is None:
         return True
-    gain = _heldout_gain(chosen, empty)
-    if coarseness > 1.0:
+    left, beyond, gain = asked.left, asked.beyond, _heldout_gain(chosen, empty)
+    if asked.coarseness > 1.0:
         within = max(left(empty.fit), beyond(empty.fit)) <= 1.0
         least = tuned.LEAST_OF_A_MEMBER if within else tuned.LEAST_IMPROVEMENT
         most = 1.0 - least if within else 1.0 + least

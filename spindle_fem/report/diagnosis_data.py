@@ -13,7 +13,7 @@ from spindle_fem.inference.findings import channel_noise
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.mismatch_place import component_shares
 from spindle_fem.inference.next_measurement import hypothesis_words
-from spindle_fem.inference.verdict import rank
+from spindle_fem.inference.set_odds import rank
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.conditions import operating_conditions
 from spindle_fem.units import MICROMETRES, ZERO_CELSIUS_K

@@ -8,7 +8,7 @@ import pandas as pd
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.registry import candidates_for, effect_of
 from spindle_fem.inference.diagnosis import Diagnosis
-from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis import Hypothesis, Ranked
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.missing_heat import Pattern, explain, onset_answers
 from spindle_fem.inference.predictor import Predictor
@@ -16,7 +16,7 @@ from spindle_fem.inference.prepared_problem import (
     EXPECTED_SLOW,
     calibrate,
 )
-from spindle_fem.inference.verdict import Judgement, Ranked
+from spindle_fem.inference.verdict import Judgement
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.recordings.align import read_recording

@@ -8,7 +8,8 @@ import pytest
 from spindle_fem.inference import like_sets, tuned
 from spindle_fem.inference.hypothesis import Ranked
 from spindle_fem.inference.like_sets import are_alike, with_needed_thirds
-from spindle_fem.inference.verdict import NEAR_REASON, rank
+from spindle_fem.inference.set_odds import rank
+from spindle_fem.inference.verdict import NEAR_REASON
 from tests.support.made_hypotheses import CHURNING, OFFSET, PRELOAD, candidate, hypothesis, verdict
 
 

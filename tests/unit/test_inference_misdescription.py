@@ -22,7 +22,7 @@ from spindle_fem.inference.heat_misdescriptions import (
     clock_change,
     shape_modes,
 )
-from spindle_fem.inference.hypothesis import Hypothesis
+from spindle_fem.inference.hypothesis import Hypothesis, Ranked
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.improved_machine import improved_machine
 from spindle_fem.inference.misdescription import Misdescription
@@ -31,7 +31,7 @@ from spindle_fem.inference.misdescription_content import misdescription_content
 from spindle_fem.inference.mounting_misdescriptions import Bridge, mounting_misdescriptions
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
-from spindle_fem.inference.verdict import Judgement, Ranked
+from spindle_fem.inference.verdict import Judgement
 from spindle_fem.inference.wrong_definition import WIDER, with_wrong_definition, wrong_direction
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.report.diagnosis_tables import misdescription_blocks

@@ -9,7 +9,7 @@ from spindle_fem.effects.framework.spread import Spread
 from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.effects.framework.unrecorded import STATES, InIntervals, UnrecordedHeatTerm
 from spindle_fem.inference import tuned
-from spindle_fem.inference.verdict import rank
+from spindle_fem.inference.set_odds import rank
 from tests.support.made_hypotheses import CHURNING, OFFSET, PRELOAD, candidate, hypothesis, verdict
 
 
