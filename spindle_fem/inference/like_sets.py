@@ -93,8 +93,7 @@ def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
     what held-out readings lack of twenty to one for it. Together the two and all their thirds keep their
     probability.
     """
-    doubted = dict.fromkeys((item.fit.named_keys for item in ranked), 1.0)
-    beside: dict[frozenset, list[Ranked]] = {}
+    beside: dict[frozenset, list[tuple[Ranked, float]]] = {}
     for item in ranked:
         pairs = [
             other
@@ -107,14 +106,13 @@ def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
             continue
         pair = min(pairs, key=lambda other: other.best.heldout)
         gain = 0.5 * (pair.best.heldout - item.best.heldout) / tuned.GAIN_DIVISOR
-        doubted[item.fit.named_keys] = float(np.exp(min(0.0, gain - tuned.LEAST_HELDOUT_GAIN)))
-        beside.setdefault(pair.fit.named_keys, [pair]).append(item)
+        doubted = item.probability * float(np.exp(min(0.0, gain - tuned.LEAST_HELDOUT_GAIN)))
+        beside.setdefault(pair.fit.named_keys, [(pair, pair.probability)]).append((item, doubted))
     shares = {item.fit.named_keys: item.probability for item in ranked}
     for group in beside.values():
-        rest = sum(item.probability * doubted[item.fit.named_keys] for item in group)
-        scale = sum(item.probability for item in group) / max(rest, np.finfo(float).tiny)
-        for item in group:
-            shares[item.fit.named_keys] = item.probability * doubted[item.fit.named_keys] * scale
+        whole, rest = sum(item.probability for item, _ in group), sum(weight for _, weight in group)
+        scale = whole / max(rest, np.finfo(float).tiny)
+        shares |= {item.fit.named_keys: weight * scale for item, weight in group}
     found = [replace(item, probability=shares[item.fit.named_keys]) for item in ranked]
     return sorted(found, key=lambda item: -item.probability)
 
