@@ -30,8 +30,9 @@ def run_search(search: Search, begin: Mapping[str, float]) -> list[Hypothesis]:
     search.keep(Hypothesis(null, float(np.log(tuned.NUMBER_PRIOR[0]))))
     search.progress("diagnosis: screening")
     starts = [(null, *search.screened(null))]
-    if null.reduced_misfit > tuned.DISTORTED**2:
-        # Missing physics has pulled the parameters far off; the prior values are nearer the truth.
+    is_network = search.problem.predictor.is_network
+    if _pulled_far_off(null, is_network):
+        # The prior values are nearer the truth.
         known = search.problem.fit(iterations=0)
         starts.append((known, *search.screened(known, null)))
     # The last start is the best one.
@@ -45,7 +46,6 @@ def run_search(search: Search, begin: Mapping[str, float]) -> list[Hypothesis]:
             always=tuned.SINGLES_ALWAYS_FITTED,
         )
     search.fit_all(_far_off(search, null))
-    is_network = search.problem.predictor.is_network
     if is_network:
         _what_changes(search, starts[-1][0])
         _second_event(search)
@@ -77,6 +77,12 @@ def run_search(search: Search, begin: Mapping[str, float]) -> list[Hypothesis]:
         # What was found beside a law may explain all that the law did.
         reduced(search)
     return search.ranked()
+
+
+def _pulled_far_off(null: Fit, is_network: bool) -> bool:
+    """Whether missing physics has pulled a machine's parameters far off what is known of them."""
+    departs = null.misfit_with_prior - null.misfit > tuned.PULLED
+    return null.reduced_misfit > tuned.DISTORTED**2 or (departs and not is_network)
 
 
 def _far_off(search: Search, null: Fit) -> list[Task]:

@@ -143,3 +143,19 @@ def test_beside_the_best_set_additions_are_fitted_that_promise_little():
     assert fitted(gains, beside=True) == [0, 1, 2, 3]
     assert fitted((least - 0.1,)) == []
     assert fitted((least - 0.1, least - short + 0.1, least - short - 0.1), beside=True) == [0, 1]
+
+
+def test_a_search_begins_from_what_is_known_too_where_nothing_missing_departs_far_from_it():
+    def pulled(misfit_per_datum, departs, is_network=False):
+        null = SimpleNamespace(
+            reduced_misfit=misfit_per_datum, misfit=500.0, misfit_with_prior=500.0 + departs
+        )
+        return search_course._pulled_far_off(null, is_network)
+
+    much, far = 1.01 * tuned.DISTORTED**2, 1.01 * tuned.PULLED
+    assert not pulled(0.99 * tuned.DISTORTED**2, 0.99 * tuned.PULLED)
+    assert pulled(much, 0.0)
+    assert pulled(much, 0.0, is_network=True)
+    assert pulled(1.0, far)
+    # What is known of a network's nodes is loose.
+    assert not pulled(1.0, far, is_network=True)
