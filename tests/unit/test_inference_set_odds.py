@@ -14,7 +14,6 @@ from tests.support.made_hypotheses import (
     OFFSET,
     PRELOAD,
     hypothesis,
-    verdict,
 )
 
 
@@ -28,17 +27,6 @@ def test_probabilities_of_sets_add_up_over_their_forms():
     assert ranked[0].fit.keys == {("thermal_preload", "front_bearings")}
     assert sum(item.probability for item in ranked) == pytest.approx(1.0)
     assert [item.probability for item in ranked] == sorted((i.probability for i in ranked), reverse=True)
-
-
-def test_what_all_likely_sets_hold_is_named_whether_there_is_more_or_not():
-    null, one = hypothesis(misfit=2000.0), hypothesis(PRELOAD, misfit=400.0)
-    more = [hypothesis(PRELOAD, OFFSET, misfit=400.0, evidence=one.fit.log_evidence + 1.0)]
-    other = [hypothesis(CHURNING, misfit=400.0, evidence=one.fit.log_evidence)]
-    assert verdict(null, one, *other, calibrated=True).verdict == "ambiguous"
-    sure = verdict(null, one, *more, calibrated=True)
-    assert sure.verdict == "missing_physics"
-    assert sure.evidence < tuned.DECIDED
-    assert [item.fit.keys for item in sure.alternatives] == [more[0].keys]
 
 
 def test_the_better_form_speaks_for_its_set():

@@ -263,6 +263,17 @@ def test_physics_comes_before_parameters_before_sensors():
     assert kind_of([]) == "consistent"
 
 
+def test_what_all_likely_sets_hold_is_named_whether_there_is_more_or_not():
+    null, one = hypothesis(misfit=2000.0), hypothesis(PRELOAD, misfit=400.0)
+    more = [hypothesis(PRELOAD, OFFSET, misfit=400.0, evidence=one.fit.log_evidence + 1.0)]
+    other = [hypothesis(CHURNING, misfit=400.0, evidence=one.fit.log_evidence)]
+    assert verdict(null, one, *other, calibrated=True).verdict == "ambiguous"
+    sure = verdict(null, one, *more, calibrated=True)
+    assert sure.verdict == "missing_physics"
+    assert sure.evidence < tuned.DECIDED
+    assert [item.fit.keys for item in sure.alternatives] == [more[0].keys]
+
+
 def test_two_sets_as_good_are_ambiguous_and_both_named():
     found = verdict(
         hypothesis(misfit=1400.0), hypothesis(PRELOAD, misfit=400.0), hypothesis(CHURNING, misfit=400.4)
