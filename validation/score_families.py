@@ -69,7 +69,7 @@ def accepted(answer: dict[str, Any]) -> dict[str, Any]:
 
 
 def must_be_told(answer: dict[str, Any]) -> bool:
-    """Whether what an undecidable case is mistaken for is not as faint as what may be left unsaid."""
+    """Whether what reads like a case's effects has to be named: what is too faint may be left unsaid."""
     if answer.get("indistinguishable"):
         return undecidable(answer)
     return [] not in answer["acceptable_sets"]
