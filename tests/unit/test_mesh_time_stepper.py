@@ -15,6 +15,7 @@ from spindle_fem.machine.meshing.simple_bodies import (
     build_structured_mesh,
     signed_inverse_condition,
 )
+from spindle_fem.model.mesh import time_stepper
 from spindle_fem.model.mesh.conduction_problem import (
     PERFECT_CONTACT,
     ConductionProblem,
@@ -234,7 +235,7 @@ def _other_nodes(time, state):
 
 
 def test_hidden_jump_is_an_error_that_asks_for_breakpoints(monkeypatch):
-    monkeypatch.setattr("spindle_fem.model.mesh.time_stepper.MAX_REJECTIONS", 2)
+    monkeypatch.setattr("spindle_fem.model.mesh.time_stepper.MAX_REJECTIONS", 1)
 
     def inputs(time, state):
         return replace(PROBLEM, surface_heat={"inner.inner": 1e6 * (time > 50.0)})
@@ -304,6 +305,17 @@ def test_steps_follow_the_trend_of_their_error():
     grown = sizes > 10.0 * sizes[0]
     assert np.median(errors[grown]) > 0.004
     assert len(sizes) < 26
+
+
+@pytest.mark.parametrize(("power", "most"), [(0.5, 2), (0.6, 2), (1.0, 2), (3.0, 1)])
+def test_a_refused_step_finds_the_power_with_which_its_error_goes(power, most):
+    """After a jump at a surface it is the root of the length: the third power would take seven tries."""
+    choice = time_stepper._StepChoice(0.5)
+    size, tries = 30.0, 0
+    while (error := 2.0 * (size / 30.0) ** power) > 0.5:
+        size, tries = choice.shorter(size, error), tries + 1
+    assert 1 <= tries <= most
+    assert error > 1e-4
 
 
 def test_one_preconditioner_serves_steps_of_many_sizes():

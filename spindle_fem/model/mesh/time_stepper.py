@@ -27,7 +27,9 @@ LARGEST_GROWTH, WORTHWHILE_GROWTH = 4.0, 1.1
 # The trend of the error is believed as far as this in the next length.
 LARGEST_TREND = 2.0
 # A step that is too long becomes no shorter than this share at once.
-LARGEST_CUT = 0.2
+LARGEST_CUT = 0.1
+# Powers of its length with which the error of a step goes: of a smooth course, and at a surface after a jump.
+ORDER, AFTER_JUMP = 3.0, 0.5
 MAX_REJECTIONS = 30
 
 
@@ -253,33 +255,43 @@ class _StepChoice:
     The error of a step goes with the third power of its length, times what the machine's relaxation
     makes of it: while that fades, steps that follow the last error alone are always late. Its change
     over the last step is taken to go on. Lengths that would change little stay, so that equal steps
-    share their matrix.
+    share their matrix. After a jump the surface that feels it follows the root of the time, and so does
+    the error of a step until it is short: a step that is refused twice tells which power holds.
 
-    Source: predictive control, Gustafsson (1994), ACM Trans. Math. Softw. 20, 496-517.
+    Source: predictive control and its order after refused steps, Gustafsson (1994), ACM Trans. Math.
+    Softw. 20, 496-517.
     """
 
     def __init__(self, tolerance: float | None) -> None:
         self._tolerance = tolerance
         self._last: tuple[float, float] | None = None
+        self._refused: tuple[float, float] | None = None
+        self._power = AFTER_JUMP
 
     def forget(self) -> None:
         """Drop the last error: the inputs jump."""
-        self._last = None
+        self._last = self._refused = None
+        self._power = AFTER_JUMP
 
     def shorter(self, size: float, error: float) -> float:
         """Length after a step whose error is too large."""
-        self._last = None
-        return size * max(SAFETY * (self._tolerance / error) ** (1.0 / 3.0), LARGEST_CUT)
+        if self._refused is not None:
+            before, larger = self._refused
+            power = float(np.log(larger / error) / np.log(before / size))
+            self._power = min(max(power, AFTER_JUMP), ORDER)
+        self._last, self._refused = None, (size, error)
+        return size * max(SAFETY * (self._tolerance / error) ** (1.0 / self._power), LARGEST_CUT)
 
     def following(self, step: float, size: float, error: float) -> float:
         """Length after an accepted step of ``size``, which was ``step`` but for the end of a stretch."""
+        self._refused, self._power = None, ORDER
         if self._tolerance is None:
             return step
         error = max(error, 1e-12 * self._tolerance)
-        factor = SAFETY * (self._tolerance / error) ** (1.0 / 3.0)
+        factor = SAFETY * (self._tolerance / error) ** (1.0 / ORDER)
         if self._last is not None:
             before, earlier = self._last
-            fading = size / before * (earlier / error) ** (1.0 / 3.0)
+            fading = size / before * (earlier / error) ** (1.0 / ORDER)
             factor *= min(max(fading, 1.0), LARGEST_TREND)
         self._last = (size, error)
         factor = min(factor, LARGEST_GROWTH)
