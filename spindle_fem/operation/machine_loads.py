@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -80,7 +80,12 @@ class LoadsBuilder:
             for row, film in spec.wetted_rows.items()
         }
         self.facet_area = {**facet_area, **self._rows}
-        self._centres = {name: facet_centres(mesh.points, facets) for name, facets in mesh.surfaces.items()}
+        # What a watt per kelvin of a ball row is over the facets of its raceways, (n_sectors, n_facets) 1/m².
+        self._raceway_shares = {
+            surface: self._sector_shares(surface)
+            for _, bearing in spec.bearings
+            for surface in (f"{bearing.name}.inner_raceway", f"{bearing.name}.outer_raceway")
+        }
         self.cells: ChannelCells | None = None
         self.coolant_loop: CoolantLoop | None = None
         if spec.channel is not None:
@@ -92,6 +97,26 @@ class LoadsBuilder:
             )
             for gap in spec.gap
         }
+
+        self._gap_radii = {
+            gap.name: (self._mean_radius((gap.rotating,)), self._mean_radius(gap.standing))
+            for gap in spec.gap
+        }
+
+    def _sector_shares(self, surface: str) -> NDArray[np.float64]:
+        """Share of each sector over its own part of a raceway, (n_sectors, n_facets) 1/m²."""
+        centres = facet_centres(self.mesh.points, self.mesh.surfaces[surface])
+        number = self.n_sectors
+        sector = np.minimum((angle_of(centres) / (2.0 * np.pi) * number).astype(int), number - 1)
+        inside = sector == np.arange(number)[:, None]
+        area = (inside @ self.facet_area[surface])[:, None]
+        return np.divide(1.0 / number, area, out=np.zeros(inside.shape), where=inside)
+
+    def _mean_radius(self, surfaces: Sequence[str]) -> float:
+        """Area mean of the distance from the axis over one side of a gap, m."""
+        centres = np.concatenate([facet_centres(self.mesh.points, self.mesh.surfaces[n]) for n in surfaces])
+        areas = np.concatenate([self.facet_area[name] for name in surfaces])
+        return float(areas @ np.hypot(centres[:, 0], centres[:, 1]) / areas.sum())
 
     # ------------------------------------------------------------------ means
     def surface_mean(self, surface: str, state: FieldState) -> float:
@@ -225,20 +250,12 @@ class LoadsBuilder:
         bearing = next(item for item in group.bearing if item.name == name)
         capacity = ball_row_capacity(self.spec, group, bearing)
         raceways = (f"{name}.inner_raceway", f"{name}.outer_raceway")
-        sectors = {
-            surface: np.minimum(
-                (angle_of(self._centres[surface]) / (2.0 * np.pi) * self.n_sectors).astype(int),
-                self.n_sectors - 1,
-            )
-            for surface in raceways
-        }
         nodes = []
         for sector, node in enumerate(self.ball_nodes(name)):
-            connections = {}
-            for surface, conductance in zip(raceways, conductances, strict=True):
-                inside = sectors[surface] == sector
-                area = self.facet_area[surface][inside].sum()
-                connections[surface] = np.where(inside, conductance / self.n_sectors / area, 0.0)
+            connections = {
+                surface: conductance * self._raceway_shares[surface][sector]
+                for surface, conductance in zip(raceways, conductances, strict=True)
+            }
             own_capacity = capacity / self.n_sectors + change.lumped_capacity.get(node, 0.0)
             own_heat = ball_heat / self.n_sectors + change.lumped_heat.get(node, 0.0)
             nodes.append(LumpedLoad(node, own_capacity, own_heat, connections))
@@ -315,7 +332,7 @@ class LoadsBuilder:
         nodes = []
         for gap in self.spec.gap:
             bands = self.gaps[gap.name]
-            coefficient, said = gap_coefficient(gap, point, *self._gap_radii(gap.rotating, gap.standing))
+            coefficient, said = gap_coefficient(gap, point, *self._gap_radii[gap.name])
             warnings += said
             # Half the resistance on either side of the mixed air.
             conductance = 2.0 * coefficient * change.factor(f"gap.{gap.name}") * bands.conductance_share
@@ -330,15 +347,6 @@ class LoadsBuilder:
                     connections[name] = np.where(cells == cell, on_standing[name], 0.0)
                 nodes.append(LumpedLoad(f"{gap.name}[{cell}]", 0.0, 0.0, connections))
         return nodes
-
-    def _gap_radii(self, rotating: str, standing: tuple[str, ...]) -> tuple[float, float]:
-        """Mean radius of the turning side and of what faces it, m."""
-        radii = []
-        for names in ((rotating,), standing):
-            centres = np.concatenate([self._centres[name] for name in names])
-            areas = np.concatenate([self.facet_area[name] for name in names])
-            radii.append(float(areas @ np.hypot(centres[:, 0], centres[:, 1]) / areas.sum()))
-        return radii[0], radii[1]
 
     def _channel_films(self, coolant: CoolantState) -> dict[str, FilmLoad]:
         cells = self.cells

@@ -55,19 +55,14 @@ class PreparedMachine:
 
     def field_state(self, unknowns: NDArray[np.float64], lumped: Mapping[str, float]) -> FieldState:
         """Quantities of a field that the loads need: the mean over each facet, and the lumped nodes."""
-        facets = {
-            surface: self.operators.facet_integral(unknowns, rows) / self.operators.facet_area[rows]
-            for surface, rows in self.operators.surface_rows.items()
-        }
+        operators = self.operators
+        area = operators.facet_area
+        integral = operators.facet_integral(unknowns, slice(0, len(area)))
+        mean = integral / area
+        facets = {surface: mean[rows] for surface, rows in operators.surface_rows.items()}
         sides = {
-            joint: tuple(
-                float(
-                    self.operators.facet_integral(unknowns, rows).sum()
-                    / self.operators.facet_area[rows].sum()
-                )
-                for rows in self.operators.joint_rows[joint]
-            )
-            for joint in self.operators.joint_rows
+            joint: tuple(float(integral[rows].sum() / area[rows].sum()) for rows in both)
+            for joint, both in operators.joint_rows.items()
             if not joint.endswith(":face")
         }
         shifts = {} if self.growth is None else self.growth.shifts(unknowns)

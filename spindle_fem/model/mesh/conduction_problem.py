@@ -224,19 +224,21 @@ def _require(holds: bool, where: str, value: object, allowed: str) -> None:
         raise SpecError(where, f"{value!r}.", f"Allowed: {allowed}.")
 
 
+def _require_not_negative(values: NDArray[np.float64], where: str, allowed: str = "0 or more") -> None:
+    """Refuse values below zero, with one pass over them: each stage of a step checks a hundred surfaces."""
+    least = values.min(initial=0.0)
+    if least < 0.0:
+        raise SpecError(where, f"{least!r}.", f"Allowed: {allowed}.")
+
+
 def _require_films(problem: ConductionProblem) -> None:
     operators = problem.operators
     labels = set()
     for film in problem.films:
         values = operators.per_facet(film.surface, film.coefficient, f"film {film.label}")
         ambient = operators.per_facet(film.surface, film.ambient_temperature, f"film {film.label}")
-        _require(bool(np.all(values >= 0.0)), f"film {film.label}: coefficient", values.min(), "0 or more")
-        _require(
-            bool(np.all(ambient >= 0.0)),
-            f"film {film.label}: ambient temperature",
-            ambient.min(),
-            "kelvin, 0 or more",
-        )
+        _require_not_negative(values, f"film {film.label}: coefficient")
+        _require_not_negative(ambient, f"film {film.label}: ambient temperature", "kelvin, 0 or more")
         _require(film.label not in labels, "films", film.label, "each name once; give the second film a name")
         labels.add(film.label)
     for law in problem.film_laws:
@@ -265,7 +267,7 @@ def _require_joints(problem: ConductionProblem) -> None:
         if np.ndim(value) == 0 and value == PERFECT_CONTACT:
             continue
         values = spread(value, side_a.stop - side_a.start, f"joint {joint}")
-        _require(bool(np.all(values >= 0.0)), f"conductance of joint {joint}", values.min(), "0 or more")
+        _require_not_negative(values, f"conductance of joint {joint}")
     missing = [joint for joint in operators.joint_rows if joint not in problem.joint_conductance]
     if missing:
         raise SpecError(
@@ -279,12 +281,7 @@ def _require_lumped(problem: ConductionProblem) -> None:
     for node in problem.lumped_nodes:
         for surface, value in node.connections:
             values = problem.operators.per_facet(surface, value, f"lumped node {node.name}")
-            _require(
-                bool(np.all(values >= 0.0)),
-                f"lumped node {node.name}: coefficient",
-                values.min(),
-                "0 or more",
-            )
+            _require_not_negative(values, f"lumped node {node.name}: coefficient")
         _require(node.capacity >= 0.0, f"lumped node {node.name}: capacity", node.capacity, "0 or more")
     for link in problem.lumped_links:
         for name in (link.node, *([link.other] if link.other is not None else [])):

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film
+from spindle_fem.model.mesh.conduction_problem import ConductionProblem, Film, LumpedLink, LumpedNode
 from spindle_fem.model.mesh.mesh_operators import ThermalOperators, spread
 
 Array = NDArray[np.float64]
@@ -28,19 +28,12 @@ def near(fresh: ConductionProblem, kept: ConductionProblem, tolerance: float) ->
     """Whether no coefficient differs by more than this share of the largest of its surface."""
     if fresh.operators is not kept.operators or fresh.lumped_names != kept.lumped_names:
         return False
-    links = [
-        [
-            replace(link, temperature=None if link.temperature is None else 0.0)
-            for link in problem.lumped_links
-        ]
-        for problem in (fresh, kept)
-    ]
     shares = (
         _within(fresh.conductivity[part], value, min(tolerance, SAME_CONDUCTIVITY))
         for part, value in kept.conductivity.items()
     )
     return (
-        links[0] == links[1]
+        [*map(_conducts, fresh.lumped_links)] == [*map(_conducts, kept.lumped_links)]
         and fresh.conductivity.keys() == kept.conductivity.keys()
         and all(shares)
         and [film.surface for film in fresh.films] == [film.surface for film in kept.films]
@@ -93,8 +86,13 @@ def on_matrix_of(
     )
 
 
-def _surfaces(node) -> list[str]:
+def _surfaces(node: LumpedNode) -> list[str]:
     return [surface for surface, _ in node.connections]
+
+
+def _conducts(link: LumpedLink) -> tuple[str, str | None, str, float]:
+    """What a link conducts between: all of it but the temperature that it may lead to."""
+    return link.node, link.other, link.name, link.conductance
 
 
 def _pairs(fresh: ConductionProblem, kept: ConductionProblem) -> Iterator[tuple[ArrayLike, ArrayLike]]:

@@ -304,6 +304,6 @@ def spread(value: ArrayLike, count: int, where: str) -> NDArray[np.float64]:
     array = np.asarray(value, dtype=float)
     if array.ndim > 1 or (array.ndim == 1 and array.size != count):
         raise SpecError(where, f"an array of shape {array.shape}.", f"Allowed: a number or {count} values.")
-    if not np.all(np.isfinite(array)):
+    if not np.isfinite(array).all():
         raise SpecError(where, "a value that is not finite.", "Allowed: finite numbers.")
-    return np.broadcast_to(array, (count,))
+    return array if array.ndim else np.full(count, array)
