@@ -104,6 +104,21 @@ def test_a_run_that_is_known_takes_one_round(fast, steps, monkeypatch):
     assert np.abs(again - states).max() < 1e-6
 
 
+def test_a_run_begins_from_the_machine_without_its_terms(fast, steps, monkeypatch):
+    """From a uniform field, feedback that is strong there alone would run away in the first round."""
+    begun = []
+    plain = TermMarch._at_once
+    monkeypatch.setattr(
+        TermMarch,
+        "_at_once",
+        lambda self, near, close: begun.append((near, close)) or plain(self, near, close),
+    )
+    simulate_fast(fast, steps, 293.15, terms=(Feedback(),))
+    ((near, close),) = begun
+    np.testing.assert_allclose(near, simulate_fast(fast, steps, 293.15).states, atol=1e-9)
+    assert not close
+
+
 def test_a_range_that_the_first_rounds_leave_is_marched_step_by_step(fast, steps):
     class Narrow(Feedback):
         def heat(self, context):

@@ -125,7 +125,7 @@ def test_natural_films_of_a_whole_run_are_those_step_by_step(fast, monkeypatch):
     times = np.linspace(0.0, 7200.0, 121)
     drive = drive_of(times, 3000.0 * (times < 4000.0), ambient=294.15 + 4.0 * np.sin(times / 900.0))
     run = simulate_fast(natural, drive, 293.15)
-    monkeypatch.setattr(TermMarch, "_at_once", lambda self, near: None)
+    monkeypatch.setattr(TermMarch, "_at_once", lambda self, near, close: None)
     stepped = simulate_fast(natural, drive, 293.15)
     assert np.ptp(run.states) > 5.0
     assert np.abs(run.states - stepped.states).max() < 1e-6

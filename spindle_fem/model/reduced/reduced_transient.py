@@ -214,7 +214,8 @@ class TransientRun:
     def march(self, initial: float | Array | Start, near: Array | None = None) -> tuple[Array, Tracks | None]:
         """States at the ends of all steps, (G + 1, r), and what the terms did.
 
-        ``near`` are states (G + 1, r) of a run that is near: terms that answer are solved from there.
+        ``near`` are states (G + 1, r) of a run that is near: terms that answer are solved from there, else
+        from what the machine does without them.
         """
         start = Start.of(initial, self.fast.model.one)
         if start.points.tolist() != [0, *self.drive.restarts]:
@@ -228,9 +229,12 @@ class TransientRun:
         for key, rows in self.groups.items():
             loads = self.loads[key[0]]
             response[rows] = load_response(self.propagators[key], self.start[rows], self.end[rows], loads)
-        if self.dynamic is not None:
-            return self._with_terms(start, response).march(near)
-        return self._carried(response[:, :, None], start.states[:, :, None])[:, :, 0], None
+        if self.dynamic is not None and near is not None:
+            return self._with_terms(start, response).march(near, close=True)
+        states = self._carried(response[:, :, None], start.states[:, :, None])[:, :, 0]
+        if self.dynamic is None:
+            return states, None
+        return self._with_terms(start, response).march(states, close=False)
 
     def _carried(self, forcing: Array, start: Array) -> Array:
         """Columns (G + 1, r, p) from those that are given (S, r, p), with what every step adds (G, r, p)."""

@@ -120,13 +120,15 @@ class TermMarch:
     friction_by: tuple[Array, Array]
     shifts: tuple[Mapping[str, tuple[Array, Array]], Mapping[str, tuple[Array, Array]]]
 
-    def march(self, near: Array | None = None) -> tuple[Array, Tracks]:
+    def march(self, near: Array, *, close: bool) -> tuple[Array, Tracks]:
         """States at the ends of all steps, (G + 1, r), and what the terms did.
 
         Parameters
         ----------
-        near : (G + 1, r) ndarray, optional
-            States of a run that is near; a uniform one where absent.
+        near : (G + 1, r) ndarray
+            States to begin from.
+        close : bool
+            Whether they are so near that the first round may be the last.
 
         Raises
         ------
@@ -136,7 +138,7 @@ class TermMarch:
         # A state may exist even if it diverges in Newton's first rounds.
         with np.errstate(all="ignore"):
             try:
-                found = self._at_once(near)
+                found = self._at_once(near, close)
             except OutOfValidityError:
                 found = None
         return self._step_by_step() if found is None else found
@@ -175,23 +177,19 @@ class TermMarch:
         """Steps that bridge a gap."""
         return np.array([point - 1 for point in self.answers.given if point], dtype=np.int64)
 
-    def _at_once(self, near: Array | None) -> tuple[Array, Tracks] | None:
+    def _at_once(self, near: Array, close: bool) -> tuple[Array, Tracks] | None:
         """Solution of all steps at once; None if Newton's method does not converge soon."""
         answers, start = self.answers, self.start
-        steps = len(answers.group_of_step)
         begins = np.flatnonzero(~self._goes_on())
         before, after = self._instants(at_end=False), self._instants(at_end=True)
         forcing = answers.with_sensed(self.response[:, :, None])
         given = start.states[:, :, None]
-        # From a run that is near the first round may be the last, which needs the derivatives to parameters.
-        near_given = near is not None
-        slopes = near_given and bool(self.dynamic.derivatives)
-        if near is None:
-            near = start.states[np.searchsorted(start.points, np.arange(steps + 1), side="right") - 1]
+        # The round that may be the last needs the derivatives to parameters.
+        slopes = close and bool(self.dynamic.derivatives)
         sensed = near @ answers.sense.T
         memory, before_that = None, np.nan
         # Where derivatives follow, the lines must be those of the last round.
-        only_values = near_given and not self.dynamic.derivatives
+        only_values = close and not self.dynamic.derivatives
         for _ in range(MOST_ROUNDS):
             if not np.all(np.isfinite(sensed)):
                 return None
