@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.inference.candidate_response import BaseRun
+from spindle_fem.inference.coordinate_names import GAP_PREFIX, JUMP_PREFIX
 from spindle_fem.inference.misdescription import Change, Misdescription
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.fast_model import FastModel, ModelInputs
@@ -47,7 +48,9 @@ def structural_columns(base: BaseRun) -> dict[str, Array]:
     model = model_with_directions(base.predictor.fast)
     names = tuple(item.name for item in model.structural)
     own = base.predictor.with_model(model, SAME_WITHIN)
-    predicted = own.at_places(base.number, base.values, base.candidates, names)
+    # What rows and gaps leave open moves readings to first order, which no direction changes.
+    values = {n: value for n, value in base.values.items() if not n.startswith((JUMP_PREFIX, GAP_PREFIX))}
+    predicted = own.at_places(base.number, values, base.candidates, names)
     return {name: predicted.sensitivity[:, :, column] for column, name in enumerate(names)}
 
 

@@ -10,8 +10,9 @@ from spindle_fem.effects.catalogue.coolant_bypass import MIXED
 from spindle_fem.effects.registry import candidates_for, catalogue
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.inference import search_course, structural_misdescriptions, tuned
+from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coolant_misdescriptions import StandingCoolant
-from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
+from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX
 from spindle_fem.inference.heat_misdescriptions import SpeedShape
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.misdescription import Misdescription
@@ -141,6 +142,24 @@ def test_what_faces_do_passes_once_through_what_a_sensor_reads(case, monkeypatch
     found = about.predict(0, values, [lying], [direction.coordinate, face]).sensitivity
     assert np.abs(found[:, :, 1]).max(axis=0).min() > 0.0
     np.testing.assert_allclose(found[:, :, 0], found[:, :, 1], atol=1e-9)
+
+
+def test_what_rows_and_gaps_leave_open_is_not_worked_out_for_moved_faces(case, monkeypatch):
+    """It moves readings to first order: a run of its own for each would change no derivative."""
+    own, asked = Predictor(case.fast, [case.blank]), []
+    moved, name = copy.copy(case.fast), own.uncertain()[0].name
+    moved.structural = [SimpleNamespace(name=name)]
+    monkeypatch.setattr(structural_misdescriptions, "model_with_directions", lambda fast: moved)
+    plain = Predictor.at_places
+    monkeypatch.setattr(
+        Predictor,
+        "at_places",
+        lambda self, number, values, *rest: asked.append(values) or plain(self, number, values, *rest),
+    )
+    base = BaseRun(own, 0, {JUMP_PREFIX + "0.0": 0.3, GAP_PREFIX + "0.0": 1.0, name: 1.1})
+    found = structural_misdescriptions.structural_columns(base)
+    assert asked == [{name: 1.1}]
+    assert np.abs(found[name]).max() > 0.0
 
 
 @pytest.mark.parametrize(
