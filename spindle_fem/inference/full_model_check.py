@@ -55,8 +55,8 @@ COARSE_MESH = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
 # Noise of the quietest channel [K] counts within these: a coarse mesh is not as good as the best sensors, and
 # loads must follow the field even for the worst.
 QUIETEST, LOUDEST = 0.02, 0.2
-# First step of a run, s.
-FIRST_STEP = 30.0
+# First step of a run and after a jump, s: about what its error allows there.
+FIRST_STEP = 15.0
 # Most time steps of a fit that is run unasked: it then takes about as long as the search.
 MOST_STEPS = 800
 # Further steps that a jump of an input costs.

@@ -150,13 +150,13 @@ def test_unasked_a_network_says_nothing_of_a_full_model(predictor):
 def test_time_is_followed_as_well_as_the_quietest_channel_can_tell(predictor):
     options = options_for(predictor)
     assert (options.error, options.coupling_tolerance, options.input_resolution) == pytest.approx(
-        (1.0, 0.01, 0.2), rel=1e-3
+        (2.0, 0.01, 0.2), rel=1e-3
     )
     recording = predictor.recordings[0]
     loud = SimpleNamespace(recordings=(replace(recording, sigma=10.0 * recording.sigma),))
-    assert options_for(loud).error == 2.0
+    assert options_for(loud).error == 4.0
     quiet = SimpleNamespace(recordings=(recording, replace(recording, sigma=0.3 * recording.sigma)))
-    assert options_for(quiet).error == pytest.approx(0.3, rel=0.01)
+    assert options_for(quiet).error == pytest.approx(0.6, rel=0.01)
 
 
 def test_unasked_a_full_model_of_very_many_steps_is_not_run(predictor, monkeypatch):
