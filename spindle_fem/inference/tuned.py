@@ -269,9 +269,9 @@ SMEAR_SHARE, NEAR_LARGEST = 0.25, 0.8
 SEPARATES, MOSTLY = 0.9, 0.6
 
 # ------------------------------------------------------------- check by the full model (--full-model)
-# Tolerances of a step, of its coupling and of the inputs in terms of the quietest channel's noise. (In duty
-# cycles of the recorded spindle with some 46 jumps, readings stay within a third of the noise, root mean
-# square, of those at a sixtieth and a tenth of the first two.)
+# Tolerances of a step, of its coupling and of the inputs in terms of the quietest channel's noise. (In two
+# duty cycles of the recorded spindle with some 46 jumps readings are 0.4 and 0.6 of that noise, root mean
+# square, from those at a sixtieth and a tenth of the first two; half the first one leaves 0.3 and 0.6.)
 STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 20.0, 0.1, 2.0
 
 # ------------------------------------------------------ watch (python -m validation.watch_delay)
