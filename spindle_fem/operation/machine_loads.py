@@ -97,7 +97,6 @@ class LoadsBuilder:
             )
             for gap in spec.gap
         }
-
         self._gap_radii = {
             gap.name: (self._mean_radius((gap.rotating,)), self._mean_radius(gap.standing))
             for gap in spec.gap
