@@ -58,7 +58,12 @@ class CoolantLoop:
             self.port_length = float(wetted / (np.pi * self.path.port_diameter))
 
     def at(
-        self, point: OperatingPoint, wall_temperature: NDArray[np.float64], *, film_factor: float = 1.0
+        self,
+        point: OperatingPoint,
+        wall_temperature: NDArray[np.float64],
+        *,
+        film_factor: float = 1.0,
+        bounds: bool = True,
     ) -> CoolantState:
         """March at an operating point.
 
@@ -68,9 +73,11 @@ class CoolantLoop:
             Area mean of each cell.
         film_factor : float
             Beside that of the definition.
+        bounds : bool
+            Whether the spread of correlations about the film is wanted, most of the work.
         """
         driven, factor, pressure = self._driven(point, film_factor)
-        march = driven.settle(wall_temperature)
+        march = driven.settle(wall_temperature, bounds=bounds)
         shape = self.cells.cell_area.shape
         value, low, high = (
             np.broadcast_to(factor * np.asarray(item), shape)

@@ -60,7 +60,14 @@ class LoadsBuilder:
     """Evaluates the loads of one machine on one mesh, again and again.
 
     Everything that only depends on geometry is sorted once at construction.
+
+    Attributes
+    ----------
+    film_bounds : bool
+        Whether coolant states hold the spread of correlations about the channel's film.
     """
+
+    film_bounds: bool = True
 
     def __init__(
         self,
@@ -222,7 +229,10 @@ class LoadsBuilder:
                 coolant_flow=point.coolant_flow * change.flow,
             )
             coolant = self.coolant_loop.at(
-                flowing, self.wall_temperature(state), film_factor=change.factor("channel.film")
+                flowing,
+                self.wall_temperature(state),
+                film_factor=change.factor("channel.film"),
+                bounds=self.film_bounds,
             )
             films |= self._channel_films(coolant)
             warnings += [*coolant.march.film.warnings, *coolant.pressure.warnings]

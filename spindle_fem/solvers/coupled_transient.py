@@ -139,6 +139,7 @@ class CoupledInputs:
         self.terms: FieldTerms | None = None
         builder = copy.copy(machine.builder)
         builder.heat_model = HeatInMemory(machine.builder.heat_model)
+        builder.film_bounds = False
         self.machine = replace(machine, builder=builder)
         self.history = history
         self.coefficient_tolerance = coefficient_tolerance
@@ -172,7 +173,7 @@ class CoupledInputs:
             change = self.terms.at(time, point, state.temperature, state.lumped_temperature)
         loads, coolant = self._loads(time, point, state.temperature, lumped, change)
         self.evaluations += 1
-        problem = self._on_kept_matrix(self.machine.problem(loads), state)
+        problem = self._on_kept_matrix(self.machine.problem(loads, self._kept), state)
         self._asked.append(Evaluation(time, point, loads, coolant))
         self._latest = _Answer(self._asked[-1], problem)
         return problem

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,8 +78,8 @@ class PreparedMachine:
             for node, value, fluid in zip(nodes, conductance, film.temperature.tolist(), strict=True):
                 yield LumpedLink(node, value, temperature=fluid, name=film.name)
 
-    def problem(self, loads: Loads) -> ConductionProblem:
-        """Conduction problem of given loads."""
+    def problem(self, loads: Loads, like: ConductionProblem | None = None) -> ConductionProblem:
+        """Conduction problem of given loads; ``like`` is one of other loads, whose names it shares."""
         films = tuple(
             Film(surface, film.coefficient, film.temperature, film.name)
             for surface, film in loads.films.items()
@@ -89,30 +90,30 @@ class PreparedMachine:
             for node in loads.lumped
         )
         change = loads.change
-        return ConductionProblem(
-            self.operators,
-            {part: value * change.factor(f"conductivity.{part}") for part, value in self.conductivity.items()}
-            if change.coefficients
-            else self.conductivity,
-            films=films,
-            joint_conductance={
-                name: value * change.factor(f"joint.{name}") for name, value in self.joint_conductance.items()
+        conductivity, joints = self.conductivity, self.joint_conductance
+        if change.coefficients:
+            conductivity = {
+                p: value * change.factor(f"conductivity.{p}") for p, value in conductivity.items()
             }
-            if change.coefficients
-            else self.joint_conductance,
+            joints = {name: value * change.factor(f"joint.{name}") for name, value in joints.items()}
+        sources = {
+            SOURCE_PREFIX + name: heat * self.source_spread[name] for name, heat in loads.source_heat.items()
+        }
+        made = partial(
+            ConductionProblem,
+            self.operators,
+            volumetric_capacity=self.volumetric_capacity,
+            adiabatic="rest",
+        )
+        return (made if like is None else like.altered)(
+            conductivity=conductivity,
+            films=films,
+            joint_conductance=joints,
             surface_heat=loads.surface_heat,
-            nodal_heat={
-                **change.nodal_heat,
-                **{
-                    SOURCE_PREFIX + name: heat * self.source_spread[name]
-                    for name, heat in loads.source_heat.items()
-                },
-            },
+            nodal_heat={**change.nodal_heat, **sources},
             capacity_scale=change.capacity_scale,
             lumped_nodes=lumped,
             lumped_links=tuple(self._links(loads)),
-            volumetric_capacity=self.volumetric_capacity,
-            adiabatic="rest",
         )
 
 

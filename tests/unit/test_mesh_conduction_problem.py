@@ -92,6 +92,29 @@ def test_unsound_problems_are_refused(changes, error, message):
         replace(PROBLEM, **changes)
 
 
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"films": (Film("outer.outer", -1.0, 300.0),)}, "film outer.outer: coefficient: "),
+        ({"films": (Film("outer.outer", np.nan, 300.0),)}, "not finite"),
+        ({"films": (Film("outer.outer", 1.0, -5.0),)}, "ambient temperature: .*kelvin"),
+        ({"joint_conductance": {"inner|outer": -1.0}}, r"conductance of joint inner\|outer"),
+        ({"surface_heat": {"inner.inner": np.nan}}, "not finite"),
+        ({"conductivity": {"inner": 40.0, "outer": 0.0}}, 'conductivity of "outer": 0.0'),
+    ],
+)
+def test_impossible_values_of_an_altered_problem_are_refused(changes, message):
+    with pytest.raises(SpecError, match=message):
+        PROBLEM.altered(**changes)
+
+
+def test_an_altered_problem_is_the_one_made_anew():
+    values = {"films": (Film("outer.outer", 70.0, 300.0),), "surface_heat": {"inner.inner": 50.0}}
+    altered, anew = PROBLEM.altered(**values), replace(PROBLEM, **values)
+    assert altered == anew
+    assert PROBLEM.films[0].coefficient == 50.0
+
+
 def test_heat_that_cannot_leave_is_named():
     with pytest.raises(NoSteadyStateError, match="heat cannot leave inner\\."):
         solve_steady(replace(PROBLEM, joint_conductance={"inner|outer": 0.0}))

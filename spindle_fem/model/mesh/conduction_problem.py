@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -165,6 +166,23 @@ class ConductionProblem:
     def __post_init__(self) -> None:
         require_sound(self)
 
+    def altered(self, **values: Any) -> ConductionProblem:
+        """The problem with other values of some attributes, of the same parts, surfaces and nodes.
+
+        Names are not checked again, which takes longer than making the problem.
+
+        Raises
+        ------
+        SpecError
+            Impossible values.
+        """
+        found = copy.copy(self)
+        for name, value in values.items():
+            object.__setattr__(found, name, value)
+        if not _has_possible_values(found):
+            require_sound(found)
+        return found
+
     @property
     def lumped_names(self) -> tuple[str, ...]:
         """Names of the lumped nodes, in the order of their unknowns."""
@@ -217,6 +235,22 @@ def require_sound(problem: ConductionProblem) -> None:
     _require_joints(problem)
     _require_lumped(problem)
     _require_every_surface_named(problem)
+
+
+def _has_possible_values(problem: ConductionProblem) -> bool:
+    """Whether coefficients and temperatures of surroundings, all in one pass, are 0 or more."""
+    connected = [value for node in problem.lumped_nodes for _, value in node.connections]
+    exchanged = [value for film in problem.films for value in (film.coefficient, film.ambient_temperature)]
+    links = [link.conductance for link in problem.lumped_links]
+    finite = np.concatenate([np.ravel(value) for value in (*connected, *exchanged, links)])
+    joints = np.concatenate([[0.0], *(np.ravel(value) for value in problem.joint_conductance.values())])
+    possible = bool(np.isfinite(finite).all() and finite.min(initial=0.0) >= 0.0 and (joints >= 0.0).all())
+    heats = [np.sum(heat) for heat in (*problem.surface_heat.values(), *problem.nodal_heat.values())]
+    return (
+        possible
+        and bool(np.isfinite(heats).all())
+        and all(value > 0.0 for value in problem.conductivity.values())
+    )
 
 
 def _require(holds: bool, where: str, value: object, allowed: str) -> None:

@@ -76,8 +76,7 @@ def on_matrix_of(
     nodal = dict(fresh.nodal_heat)
     if flux.any():
         nodal[DIFFERENCE] = operators.facet_vector(flux, every)
-    return replace(
-        fresh,
+    return fresh.altered(
         conductivity=kept.conductivity,
         films=films,
         lumped_nodes=tuple(nodes),

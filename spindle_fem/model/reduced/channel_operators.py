@@ -77,7 +77,7 @@ class ChannelOperators:
             wall = (
                 np.full(shape, point.coolant_inlet_temperature) if warmed is None else warmed.reshape(shape)
             )
-            state = self.loop.at(replace(point, coolant_flow=flow), wall)
+            state = self.loop.at(replace(point, coolant_flow=flow), wall, bounds=False)
             rate = float(state.march.mass_flow * np.mean(state.march.march.specific_heat_capacity))
             friction = float(state.march.march.pumping_heat.sum()) if self.spec.coolant.pumping_heat else 0.0
             self._films[key] = (state.film_coefficient.ravel(), rate, friction)

@@ -281,7 +281,7 @@ class DrivenChannel:
         march = march_enthalpy(inlet, mass_flow, capacity, wall, area, coefficient, pumping)
         return ChannelMarch(march=march, film=film, mass_flow=mass_flow)
 
-    def settle(self, wall: ArrayLike) -> ChannelMarch:
+    def settle(self, wall: ArrayLike, *, bounds: bool = True) -> ChannelMarch:
         """March of one design with properties at its own temperatures.
 
         Parameters
@@ -289,6 +289,8 @@ class DrivenChannel:
         wall : (..., n) array_like, [K]
             An axis before the last one counts the starts; without it the
             result is that of one start.
+        bounds : bool
+            As :func:`select_film` takes it.
 
         Raises
         ------
@@ -305,7 +307,8 @@ class DrivenChannel:
                 "Give every start, or one that stands for all.",
             )
         found, bulk = self._settled(wall)
-        found = replace(found, film=self._film(wall, bulk, bounds=True))
+        if bounds:
+            found = replace(found, film=self._film(wall, bulk, bounds=True))
         if self.choice.properties_at == "inlet":
             return found
         return replace(found, march=_with_true_enthalpy(found.march, self.coolant, float(found.mass_flow)))
