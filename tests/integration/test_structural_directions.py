@@ -150,6 +150,33 @@ def test_derivatives_of_a_run_are_differences_of_runs(model, directions):
 
 
 @pytest.mark.slow
+def test_operators_in_proportion_are_differences_of_operators(model, small):
+    """Of directions that leave the coolant's way alone, with bridges from places to the ambient."""
+    point = OperatingPoint.of(small.spec)
+    bridges = {"housing.outside": 1.5, "F1.outer_raceway": 0.7}
+    plain = [name for name, change in model.changes.items() if not change.moves_channel]
+    assert len(plain) == 4
+    found = model.operators(point, {}, plain, conductances=bridges)
+    storage = model.storage_by({}, plain)
+    for name in plain:
+        amount = 1e-2 * next(item.sigma for item in model.structural if item.name == name)
+        other = model.with_amount(name, amount)
+        moved = other.operators(point, {}, conductances=bridges)
+        for part in ("conduction", "loads", "outputs", "output_inputs"):
+            wanted = (getattr(moved, part) - getattr(found, part)) / amount
+            own = getattr(found, f"{part}_by").get(name, np.zeros_like(wanted))
+            if part == "loads":
+                # Warmer fluids are a load of the run.
+                always = model.load_names.index("coolant_friction")
+                wanted[:, always] = own[:, always]
+            size = np.abs(getattr(found, part)).max() / amount
+            assert own == pytest.approx(wanted, abs=1e-12 * size + 1e-6 * np.abs(wanted).max()), (name, part)
+        wanted = (other.storage({}) - model.storage({})) / amount
+        own = storage.get(name, np.zeros_like(wanted))
+        assert own == pytest.approx(wanted, abs=1e-7 * np.abs(wanted).max() + 1e-12 / amount)
+
+
+@pytest.mark.slow
 def test_the_cache_gives_the_same_model(made, tmp_path, monkeypatch, small):
     monkeypatch.setattr(structural_model, "build_structural_model", lambda machine, progress: made)
     monkeypatch.setattr(structural_model, "prepare_machine", lambda spec, progress: small)

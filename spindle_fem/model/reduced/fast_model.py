@@ -173,9 +173,7 @@ class FastModel:
     # ------------------------------------------------------------- operators
     def storage(self, factors: Mapping[str, float], added: Mapping[str, float] = NO_CHANGES) -> Array:
         """Capacity matrix, (r, r) J/K; ``added`` is further capacity at places, J/K."""
-        capacities = self.inputs.capacities()
-        weights = [capacities[name] * self.table.scale(name, factors) for name in self.model.storage_names]
-        matrix = np.tensordot(np.array(weights), self.model.storage, axes=1)
+        matrix = np.tensordot(self._capacities(factors), self.model.storage, axes=1)
         for place, capacity in added.items():
             mean = self.model.place(place)
             matrix += capacity * np.outer(mean, mean)
@@ -183,16 +181,19 @@ class FastModel:
 
     def storage_by(self, factors: Mapping[str, float], parameters: Sequence[str]) -> dict[str, Array]:
         """Derivatives of the capacity matrix to the logarithms of parameters; absent where zero."""
-        capacities = self.inputs.capacities()
+        weights = self._capacities(factors)
         found = {}
         for parameter in parameters:
             targets = set(self.table.targets(parameter))
             rows = [i for i, n in enumerate(self.model.storage_names) if targets & set(self.table.groups[n])]
             if rows:
-                names = [self.model.storage_names[i] for i in rows]
-                weights = np.array([capacities[n] * self.table.scale(n, factors) for n in names])
-                found[parameter] = np.tensordot(weights, self.model.storage[rows], axes=1)
+                found[parameter] = np.tensordot(weights[rows], self.model.storage[rows], axes=1)
         return found
+
+    def _capacities(self, factors: Mapping[str, float]) -> Array:
+        """Weight of every matrix of the storage."""
+        capacities = self.inputs.capacities()
+        return np.array([capacities[n] * self.table.scale(n, factors) for n in self.model.storage_names])
 
     def coefficients(
         self, point: OperatingPoint, factors: Mapping[str, float], changes: Mapping[str, float] = NO_CHANGES
