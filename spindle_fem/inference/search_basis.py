@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.inference import tuned
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.reduced_transient import TransientRun
+from spindle_fem.parallel import in_copies, thread_count
 
 Array = NDArray[np.float64]
 
@@ -41,14 +43,19 @@ def smaller_predictors(
     read : sequence of str
         Further places that will be read.
     """
-    places = {p for named in (view.spots, view.sides) for own in named.values() for p in own}
-    places |= {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)} | {*read}
-    known = places & {*predictor.fast.model.place_names}
+    known = acted_on(predictor, view, candidates) | ({*read} & {*predictor.fast.model.place_names})
     if predictor.is_network:
-        return predictor, predictor, frozenset(known)
+        return predictor, predictor, known
     contacts = sorted({name for own in view.joint_coefficients.values() for name in own})
     names = [prior.name for prior in predictor.uncertain()]
-    return *on_smaller_bases(predictor, names, sorted(known), contacts), frozenset(known)
+    return *on_smaller_bases(predictor, names, sorted(known), contacts), known
+
+
+def acted_on(predictor: Predictor, view: MachineView, candidates: Sequence[Candidate]) -> frozenset[str]:
+    """Places where candidates, and heat at every spot of a view, may act."""
+    places = {p for named in (view.spots, view.sides) for own in named.values() for p in own}
+    places |= {p for c in candidates for t in c.terms for p in (*t.reads, *t.heat_places)}
+    return frozenset(places & {*predictor.fast.model.place_names})
 
 
 def on_smaller_bases(
@@ -71,31 +78,23 @@ def on_smaller_bases(
         Coefficients that candidates scale one by one; parameters scale them together.
     """
     model = predictor.fast.model
-    snapshots = []
     generator = np.random.default_rng(0)
     priors = predictor.fast.sigmas(names)
+    usual, drawn = [], []
     for number in range(len(predictor.recordings)):
-        initial = predictor.start(number)
-        for draw in range(DRAWS):
-            factors = {}
-            if draw:
-                signs = generator.choice((-DRAWN_SIGMAS, DRAWN_SIGMAS), len(names))
-                factors = {n: float(np.exp(s * priors[n])) for n, s in zip(names, signs, strict=True)}
-            wanted = tuple(names) if draw == 0 else ()
-            run = predictor.transient(number, factors, (), wanted)
-            states, tracks = run.march(initial)
-            snapshots.append((states - initial * model.one).T)
-            if draw == 0:
-                usual = states
-            if wanted:
-                tangent = run.tangents(run.forcing_of(states, tracks), tracks)
-                snapshots.append(tangent[::EVERY_TANGENT].transpose(1, 0, 2).reshape(model.size, -1))
-                if number == 0:
-                    snapshots.append(_place_snapshots(predictor, run, places))
-        for contact in contacts if number == 0 else ():
-            opened, _ = predictor.transient(number, {contact: tuned.OPENED_CONTACT}).march(initial)
-            # States less those of the machine as it is: a share of them would drown the rest.
-            snapshots.append((opened - usual).T)
+        usual.append(
+            partial(_usual_snapshots, predictor, number, tuple(names), places if number == 0 else ())
+        )
+        for _ in range(1, DRAWS):
+            signs = generator.choice((-DRAWN_SIGMAS, DRAWN_SIGMAS), len(names))
+            factors = {n: float(np.exp(s * priors[n])) for n, s in zip(names, signs, strict=True)}
+            drawn.append(partial(_rise, predictor, number, factors))
+    opened = [partial(_rise, predictor, 0, {contact: tuned.OPENED_CONTACT}) for contact in contacts]
+    found = in_copies([*usual, *drawn, *opened], thread_count())
+    snapshots = [item for own in found[: len(usual)] for item in own]
+    snapshots += found[len(usual) : len(usual) + len(drawn)]
+    # States less those of the machine as it is: a share of them would drown the rest.
+    snapshots += [item - snapshots[0] for item in found[len(usual) + len(drawn) :]]
     # The uniform field stays exactly: a share of it would be a share of 293 K.
     uniform = model.one / np.linalg.norm(model.one)
     rest = np.hstack([_scaled(item) for item in snapshots])
@@ -110,6 +109,28 @@ def on_smaller_bases(
         return predictor.with_model(predictor.fast.projected(basis, spread), same)
 
     return within(tuned.SEARCH_BASIS, tuned.SAME_OPERATORS_WITHIN), within(tuned.FINAL_BASIS, 0.0)
+
+
+def _rise(predictor: Predictor, number: int, factors: Mapping[str, float]) -> Array:
+    """States of a recording above where it begins, (r, n)."""
+    initial = predictor.start(number)
+    states, _ = predictor.transient(number, factors).march(initial)
+    return (states - initial * predictor.fast.model.one).T
+
+
+def _usual_snapshots(
+    predictor: Predictor, number: int, names: tuple[str, ...], places: Sequence[str]
+) -> list[Array]:
+    """States of a recording at the prior values of parameters, and what these and heat at places change."""
+    initial, model = predictor.start(number), predictor.fast.model
+    run = predictor.transient(number, {}, (), names)
+    states, tracks = run.march(initial)
+    tangent = run.tangents(run.forcing_of(states, tracks), tracks)
+    found = [
+        (states - initial * model.one).T,
+        tangent[::EVERY_TANGENT].transpose(1, 0, 2).reshape(model.size, -1),
+    ]
+    return [*found, _place_snapshots(predictor, run, places)] if places else found
 
 
 def _place_snapshots(predictor: Predictor, run: TransientRun, places: Sequence[str]) -> Array:
