@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.unrecorded import followed_name
@@ -40,6 +40,7 @@ MOST_ITERATIONS = 30
 EXACT_SHARE = 1.0e-8
 # Largest change of any coordinate in one step, in prior deviations.
 LARGEST_MOVE = 2.0
+FIRST_DAMPING = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,7 +325,7 @@ class Problem:
         objective = Objective(self, candidates, coordinates)
         point = objective.at(position, None)
         slopes = objective.slopes(point)
-        damping = 1e-3
+        damping = FIRST_DAMPING
         for iteration in range(iterations):
             hessian, gradient = slopes.curvature(point), slopes.downhill(point)
             enough = EXACT_SHARE * point.cost
@@ -366,11 +367,13 @@ class Problem:
                 refused = move
                 damping *= 10.0
             # A step that was taken gains more than nothing. The last one gains so little that the derivatives
-            # before it serve, if they are none of an earlier step: they say how certain all values are.
+            # before it serve: they say how certain all values are. Those of an earlier step may promise too
+            # little.
             if gain <= enough:
-                if slopes.kept:
-                    slopes = objective.slopes(point)
-                break
+                if not slopes.kept:
+                    break
+                slopes, damping = objective.slopes(point), FIRST_DAMPING
+                continue
             if iteration >= tuned.HOPELESS_AFTER and point.cost - tuned.HOPELESS_REACH * gain > hopeless:
                 break
             slopes = objective.slopes(point, None if exact else slopes)
@@ -382,7 +385,7 @@ class Problem:
         _, log_root = np.linalg.slogdet(self.belief.root)
         # A prior that ends at bounds is so much denser between them.
         own = coordinates[len(self.belief.coordinates) :]
-        cut_off = -sum(float(np.log(norm.cdf(c.high) - norm.cdf(c.low))) for c in own)
+        cut_off = -sum(float(np.log(ndtr(c.high) - ndtr(c.low))) for c in own)
         return Fit(
             tuple(candidates),
             coordinates,

@@ -293,14 +293,31 @@ def test_derivatives_that_hold_are_used_again(blank, tmp_path, monkeypatch):
         asked.clear()
         return problem.fit((), start, **told), asked.count(True)
 
-    (every, steps), (some, fewer) = fitted(0), fitted(1)
-    assert fewer <= 0.75 * steps
-    assert abs(some.misfit_with_prior - every.misfit_with_prior) < 0.1
-    assert np.abs(some.position - every.position).max() < 0.1
-    assert some.log_evidence == pytest.approx(every.log_evidence, abs=0.1)
+    every, steps = fitted(0)
+    for kept in (1, 2):
+        some, fewer = fitted(kept)
+        assert fewer <= 0.75 * steps
+        assert abs(some.misfit_with_prior - every.misfit_with_prior) < 0.1
+        assert np.abs(some.position - every.position).max() < 0.1
+        assert some.log_evidence == pytest.approx(every.log_evidence, abs=0.1)
     (exact, steps), (same, as_many) = fitted(0, exact=True), fitted(1, exact=True)
     assert steps == as_many
     assert np.array_equal(exact.position, same.position)
+
+
+def test_a_fit_does_not_end_by_derivatives_of_an_earlier_step(blank, tmp_path, monkeypatch):
+    """Those here say that nothing moves the readings, so that no step promises anything."""
+    predictor = synthetic(blank, tmp_path, 1, TRUTH)
+    problem = Problem(predictor, calibrate(None, predictor).belief, QUIET, predictor.observations)
+    start = {name: 1.0 / value for name, value in TRUTH.items()}
+    wanted = problem.fit((), start)
+
+    def useless(self, point):
+        still = None if self.kept else replace(self, jacobian=1e-9 * self.jacobian, kept=1)
+        return still and replace(still, point=point, pulled=point.apart.slopes)
+
+    monkeypatch.setattr("spindle_fem.inference.fit_objective.Slopes.kept_at", useless)
+    assert problem.fit((), start).misfit_with_prior == pytest.approx(wanted.misfit_with_prior, abs=0.1)
 
 
 def test_a_prediction_without_derivatives_is_the_same(blank):

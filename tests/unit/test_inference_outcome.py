@@ -97,10 +97,10 @@ def test_missing_heat_is_found_where_and_when_it_is(heated):
     assert (where.radius, where.axial) == centre_of(heated.predictor.fast.spec, "front_bearings")
     heat = where.missing_heat["front_bearings"]
     # The machine's parameters take their part, and a walk of even steps comes late to a change: over draws of
-    # the noise the peak is half to four fifths of the heat.
+    # the noise the peak is half to four fifths of the heat. Cooling that the parameters add asks for more.
     assert 0.45 * HEAT < heat.peak < 1.1 * HEAT
     mean = HEAT * (UNTIL - FROM) / TIMES[-1]
-    assert 0.35 * mean < heat.mean < 1.1 * mean
+    assert 0.35 * mean < heat.mean < 1.3 * mean
     assert all(0.0 <= item.start < item.end <= TIMES[-1] for item in where.when)
     inside = sum(max(0.0, min(i.end, UNTIL) - max(i.start, FROM)) for i in where.when)
     assert inside > 0.8 * (UNTIL - FROM)
