@@ -21,8 +21,7 @@ from spindle_fem.inference.findings import predictions_at_stamps, states_of
 from spindle_fem.inference.full_model_check import (
     AUTO,
     OFF,
-    BegunFit,
-    begin_fit,
+    BegunRuns,
     full_model_errors,
     nothing_run,
     require_choice,
@@ -33,7 +32,7 @@ from spindle_fem.inference.next_measurement import next_measurement
 from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine, with_growth
 from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.inference.worker_processes import Workers
-from spindle_fem.parallel import keep_freed_memory, thread_count
+from spindle_fem.parallel import BackgroundProcess, keep_freed_memory, thread_count
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.compare import write_simulated
 from spindle_fem.results.output_folder import output_folder, replace_text
@@ -101,7 +100,8 @@ def diagnose(
     SpindleFemError
     """
     request = _Request(machine, recordings, folder, calibrate, overrides, heldout, full_model, progress)
-    return _diagnose(request, report=True)
+    with BackgroundProcess(_ReportWorker) as reporter:
+        return _diagnose(request, reporter)
 
 
 def diagnose_without_report(
@@ -112,10 +112,27 @@ def diagnose_without_report(
     **choices: Any,
 ) -> dict[str, Any]:
     """Run :func:`diagnose`, with the same parameters, without ``diagnosis.nc``, figures and report."""
-    return _diagnose(_Request(machine, recordings, folder, *others, **choices), report=False)
+    return _diagnose(_Request(machine, recordings, folder, *others, **choices), None)
 
 
-def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
+class _ReportWorker:
+    """Figures and report of a diagnosis: what they need is loaded while there is nothing to draw yet."""
+
+    def __init__(self) -> None:
+        from spindle_fem.report import diagnosis_report
+
+        self._report, self._pictures = diagnosis_report, None
+
+    def draw(self, place: Path, content: Mapping[str, Any]) -> None:
+        """Draw the figures from what is known so far."""
+        self._pictures = self._report.draw_figures(place, content)
+
+    def write(self, place: Path) -> None:
+        """Write the report of a folder that is complete but for it."""
+        self._report.write_diagnosis_report(place, self._pictures)
+
+
+def _diagnose(request: _Request, reporter: BackgroundProcess | None) -> dict[str, Any]:
     started = time.perf_counter()
     require_choice(request.full_model)
     keep_freed_memory()
@@ -127,7 +144,6 @@ def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
     opened = open_machine(request.machine, overrides, read, earlier, heldout=request.heldout, progress=tell)
     opened = with_growth(refined(opened))
     with output_folder(request.folder) as place:
-        drawn = None
         reason = says_too_little(opened)
         # written once there is something to say: an interrupted one leaves the machine of an earlier one
         definition = resolved_text(request.machine, overrides)
@@ -140,28 +156,27 @@ def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
         else:
             workers = Workers(min(thread_count(), MOST_WORKERS))
             workers.wake()
-            begun: list[BegunFit] = []
+            begun = BegunRuns(opened, request.full_model)
             diagnosis = diagnose_recordings(
                 opened,
                 heldout=request.heldout,
                 progress=tell,
                 workers=workers,
-                fitted_without=lambda plant, fit: begun.extend(
-                    begin_fit(opened, plant, fit, request.full_model)
-                ),
+                settled=begun.begin,
+                meanwhile=begun.prepare,
             )
             tell("writing")
             replace_text(place / "machine.toml", definition)
             improved = workers.ahead(partial(improved_machine, diagnosis, opened))
             proposed = workers.ahead(partial(next_measurement, diagnosis))
-            content = _write(diagnosis, opened, place, report=report)
-            if report:
-                drawn = workers.ahead(partial(_draw, place, json.loads(json.dumps(plain_data(content)))))
+            content = _write(diagnosis, opened, place, report=reporter is not None)
+            if reporter is not None:
+                drawn = reporter.ask("draw", place, json.loads(json.dumps(plain_data(content))))
             content["fit"]["full_model"] = full_model_errors(
                 diagnosis,
                 opened,
                 mesh=request.full_model,
-                begun=next(iter(begun), None),
+                begun=begun,
                 keep=lambda name, predicted: _write_predictions(
                     diagnosis, place, f"{name}_full_model", predicted
                 ),
@@ -170,21 +185,14 @@ def _diagnose(request: _Request, *, report: bool) -> dict[str, Any]:
             content = with_confirmation(content)
             content["next_measurement"] = proposed()
             replace_text(place / "improved_machine.toml", improved())
+            if reporter is not None:
+                drawn()
         content["wall_time_s"] = time.perf_counter() - started
         replace_text(place / "diagnosis.json", json.dumps(plain_data(content), indent=1) + "\n")
-        if report:
-            from spindle_fem.report.diagnosis_report import write_diagnosis_report
-
+        if reporter is not None:
             tell("report")
-            write_diagnosis_report(place, None if drawn is None else drawn())
+            reporter.ask("write", place)()
         return content
-
-
-def _draw(place: Path, content: Mapping[str, Any]) -> Mapping[str, list[Any]]:
-    """Figures of a diagnosis, in whatever process."""
-    from spindle_fem.report.diagnosis_report import draw_figures
-
-    return draw_figures(place, content)
 
 
 def _write(diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, report: bool) -> dict[str, Any]:

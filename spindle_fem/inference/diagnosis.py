@@ -35,7 +35,7 @@ from spindle_fem.inference.prepared_problem import (
     with_inexact_laws,
     with_own_noise,
 )
-from spindle_fem.inference.search_basis import smaller_predictors
+from spindle_fem.inference.search_basis import acted_on, on_smaller_bases, smaller_predictors
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.set_odds import rank
 from spindle_fem.inference.set_problems import SetProblems, combination_of
@@ -134,7 +134,8 @@ def diagnose_recordings(
     heldout: str = "blocks",
     progress: Progress = lambda stage: None,
     workers: Workers | None = None,
-    fitted_without: Callable[[Predictor, Fit], None] = lambda predictor, fit: None,
+    settled: Callable[[Predictor, Fit], None] = lambda predictor, fit: None,
+    meanwhile: Callable[[], None] = lambda: None,
 ) -> Diagnosis:
     """Diagnose a machine's recordings.
 
@@ -144,8 +145,11 @@ def diagnose_recordings(
         As :func:`heldout_stamps` takes it.
     workers : Workers, optional
         Processes that fit, by default as many as threads are given; the result does not depend on it.
-    fitted_without : callable
-        Gets the fit of nothing missing, and its predictor, once it is known.
+    settled : callable
+        Gets the fit of nothing missing, and that of what is told, with the predictor of each, once it is
+        known.
+    meanwhile : callable
+        Called where this process would wait for its calibration.
     """
     clock = _Clock()
     fast, view = machine.fast, machine.view
@@ -159,11 +163,14 @@ def diagnose_recordings(
     if calibration:
         earlier = Predictor(fast, calibration, effects=machine.effects).with_unseen(unseen)
     directions = misdescriptions_of(predictor)
-    calibrating = workers.ahead(partial(_calibrated, earlier, predictor, directions))
     candidates = candidates_for(view)
+    places = sorted(acted_on(predictor, view, candidates))
+    calibrating = workers.ahead(partial(_calibrated, earlier, predictor, directions, places))
     small, predictor, known = smaller_predictors(predictor, view, candidates)
     predictor = with_misdescriptions(predictor, directions)
     small = small.misdescribed_like(predictor)
+    if calibration:
+        meanwhile()
     calibrated = calibrating()
     if earlier is not None and machine.is_network:
         belief = calibrated.belief
@@ -227,7 +234,7 @@ def diagnose_recordings(
         refitted = fitted_sets(problems, to_be_fitted(plain, found, overlapping, coarseness), workers)
     else:
         problems = replace(problems, plain=plain)
-    fitted_without(problems.plain.predictor, own)
+    settled(problems.plain.predictor, own)
     refitted = [h if h.fit.candidates else replace(h, fit=own) for h in refitted]
     readings = FollowedReadings(problems, lambda fit: inferred_states(search, problems.of(fit), fit))
     readings.work_out([h.fit for h in refitted], workers)
@@ -257,6 +264,8 @@ def diagnose_recordings(
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit
     about_chosen = problems.of(chosen_fit) if chosen_fit.candidates else problems.first
+    if chosen_fit.candidates:
+        settled(about_chosen.predictor, chosen_fit)
     followed = readings.followed(chosen_fit)
     if followed.states and machine.rows:
         finer = readings.with_states(
@@ -297,11 +306,20 @@ def _coarseness(is_network: bool) -> float:
 
 
 def _calibrated(
-    earlier: Predictor | None, predictor: Predictor, directions: Sequence[Misdescription]
+    earlier: Predictor | None,
+    predictor: Predictor,
+    directions: Sequence[Misdescription],
+    places: Sequence[str],
 ) -> Calibrated:
-    """What is known of a machine on the recordings to be diagnosed, from those of its calibration if any."""
+    """What is known of a machine on the recordings to be diagnosed, from those of its calibration if any.
+
+    ``places`` are those where something may act: what is not exact of the machine acts there too.
+    """
     if earlier is not None:
-        earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
+        found = misdescriptions_of(earlier)
+        if not earlier.is_network:
+            _, earlier = on_smaller_bases(earlier, [prior.name for prior in earlier.uncertain()], places)
+        earlier = with_misdescriptions(earlier, found)
     return calibrate(earlier, predictor.misdescribed_by(directions, {}))
 
 

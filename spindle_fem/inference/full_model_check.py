@@ -56,7 +56,7 @@ COARSE_MESH = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
 # loads must follow the field even for the worst.
 QUIETEST, LOUDEST = 0.02, 0.2
 # First step of a run and after a jump, s: about what its error allows there.
-FIRST_STEP = 15.0
+FIRST_STEP = 30.0
 # Most time steps of a fit that is run unasked: it then takes about as long as the search.
 MOST_STEPS = 800
 # Further steps that a jump of an input costs.
@@ -96,22 +96,47 @@ def _on_mesh(fit: Fit) -> tuple[tuple[Candidate, ...], dict[str, float]]:
     return fit.candidates, {n: value for n, value in fit.values.items() if not n.startswith(FIRST_ORDER)}
 
 
-def begin_fit(machine: DiagnosedMachine, predictor: Predictor, fit: Fit, mesh: str = AUTO) -> list[BegunFit]:
-    """Begin the runs of a fit that :func:`full_model_errors` will probably need; none where it will not.
+class BegunRuns:
+    """Runs of a diagnosis on the coarse mesh that begin before :func:`full_model_errors` asks for them.
+
+    None begins where they will hardly be needed, or where there is no other process for them.
 
     Parameters
     ----------
     mesh : {"auto", "off", "coarse", "own"}
-        As there.
+        As :func:`full_model_errors` takes it.
     """
-    if mesh not in (AUTO, COARSE) or machine.is_network or thread_count() == 1:
-        return []
-    options = options_for(predictor)
-    if mesh == AUTO and expected_steps(predictor, options) > MOST_STEPS:
-        return []
-    spec = spec_on(machine.spec, COARSE)
-    runs = start_copy(lambda: alone(mesh_runs, prepare_machine(spec), predictor, fit, options))
-    return [BegunFit(fit, options, runs)]
+
+    def __init__(self, machine: DiagnosedMachine, mesh: str = AUTO) -> None:
+        self._machine, self._mesh = machine, mesh
+        self._needed = mesh in (AUTO, COARSE) and not machine.is_network and thread_count() > 1
+        self._prepared: PreparedMachine | None = None
+        self.fits: list[BegunFit] = []
+
+    def prepare(self) -> None:
+        """Mesh the machine, if it will be needed: all runs share it."""
+        if self._needed and self._prepared is None:
+            try:
+                self._prepared = prepare_machine(spec_on(self._machine.spec, COARSE))
+            except SpindleFemError:
+                # Who asks for the errors is told why.
+                self._needed = False
+
+    def begin(self, predictor: Predictor, fit: Fit) -> None:
+        """Begin the run of a fit."""
+        options = options_for(predictor)
+        if not self._needed or (self._mesh == AUTO and expected_steps(predictor, options) > MOST_STEPS):
+            return
+        self.prepare()
+        if self._prepared is not None:
+            runs = start_copy(partial(alone, mesh_runs, self._prepared, predictor, fit, options))
+            self.fits.append(BegunFit(fit, options, runs))
+
+    def machine_on(self, mesh: str) -> PreparedMachine:
+        """The machine on the coarse mesh or its own."""
+        if mesh == COARSE and self._prepared is not None:
+            return self._prepared
+        return prepare_machine(spec_on(self._machine.spec, mesh))
 
 
 def require_choice(choice: str) -> str:
@@ -140,7 +165,7 @@ def full_model_errors(
     *,
     mesh: str = AUTO,
     options: TransientOptions | None = None,
-    begun: BegunFit | None = None,
+    begun: BegunRuns | None = None,
     keep: Keep = lambda name, predicted: None,
     progress: Progress = lambda stage: None,
 ) -> dict[str, Any]:
@@ -156,8 +181,8 @@ def full_model_errors(
         the recordings need very many time steps.
     options : TransientOptions, optional
         How accurately time is followed; :func:`options_for` when absent.
-    begun : BegunFit, optional
-        Of :func:`begin_fit`, which serves where a fit is the same.
+    begun : BegunRuns, optional
+        Which serve where a fit is the same.
     keep : callable
         Gets ``before`` or ``after`` and its predictions.
 
@@ -186,6 +211,7 @@ def full_model_errors(
         return nothing_run(OFF if mesh == AUTO else mesh, NETWORK_REASON)
     predictor = diagnosis.predictor
     options = options_for(predictor) if options is None else options
+    begun = BegunRuns(machine, OFF) if begun is None else begun
     if mesh == AUTO:
         steps = expected_steps(predictor, options)
         if steps > MOST_STEPS:
@@ -194,9 +220,7 @@ def full_model_errors(
             )
         mesh = COARSE
     try:
-        return balanced(
-            lambda asked: _both_fits(diagnosis, machine, mesh, asked, begun, keep, progress), options
-        )
+        return balanced(lambda asked: _both_fits(diagnosis, mesh, asked, begun, keep, progress), options)
     except SpindleFemError as error:
         return nothing_run(mesh, f"It could not be run: {error}")
 
@@ -208,9 +232,14 @@ def options_for(predictor: Predictor) -> TransientOptions:
         for recording in predictor.recordings
         for channel in range(recording.temperature_count)
     ]
-    noise = float(np.clip(min(levels), QUIETEST, LOUDEST))
+    return options_to_read(float(np.clip(min(levels), QUIETEST, LOUDEST)))
+
+
+def options_to_read(noise: float) -> TransientOptions:
+    """Accuracy of the time integration for readings of some noise [K]."""
     return TransientOptions(
         error=tuned.STEP_ERROR * noise,
+        error_norm="mean",
         coupling_tolerance=tuned.COUPLING_ERROR * noise,
         input_resolution=tuned.INPUT_RESOLUTION * noise,
         first_step=FIRST_STEP,
@@ -231,28 +260,22 @@ def expected_steps(predictor: Predictor, options: TransientOptions) -> int:
 
 def _both_fits(
     diagnosis: Diagnosis,
-    machine: DiagnosedMachine,
     mesh: str,
     options: TransientOptions,
-    begun: BegunFit | None,
+    begun: BegunRuns,
     keep: Keep,
     progress: Progress,
 ) -> dict[str, Any]:
     predictor = diagnosis.predictor
     progress("full model: mesh")
-    prepared = prepare_machine(spec_on(machine.spec, mesh))
+    prepared = begun.machine_on(mesh)
     fits = {"before": diagnosis.null, "after": diagnosis.final}
-    if _is_same(*fits.values()):
-        progress("full model: before, which is after")
-        runs = dict.fromkeys(fits, run_fit(prepared, predictor, diagnosis.null, options))
-    elif begun is not None and begun.serves(diagnosis.null, mesh, options):
-        progress("full model: after, before was begun")
-        after = alone(run_fit, prepared, predictor, diagnosis.final, options)
-        runs = {"before": finished(predictor, diagnosis.null, begun.wait()), "after": after}
-    elif mesh == COARSE and thread_count() > 1:
-        runs = _side_by_side(prepared, predictor, fits, options, progress)
-    else:
-        runs = _one_by_one(prepared, predictor, fits, options, progress)
+    same = _is_same(*fits.values())
+    different = {"before, which is after": diagnosis.null} if same else fits
+    runs = _runs(prepared, predictor, different, options, mesh, begun.fits, progress)
+    if same:
+        (run,) = runs.values()
+        runs = dict.fromkeys(fits, run)
     found: dict[str, dict[str, Any]] = {}
     apart: dict[str, list[Array]] = {}
     reduced: dict[str, list[Array]] = {}
@@ -294,36 +317,45 @@ def spec_on(spec: MachineSpec, mesh: str) -> MachineSpec:
 
 
 # -------------------------------------------------------------------- details
-def _one_by_one(
+def _runs(
     machine: PreparedMachine,
     predictor: Predictor,
     fits: Mapping[str, Fit],
     options: TransientOptions,
+    mesh: str,
+    begun: Sequence[BegunFit],
     progress: Progress,
 ) -> dict[str, FullFit]:
-    found = {}
-    for name, fit in fits.items():
-        progress(f"full model: {name}")
-        found[name] = run_fit(machine, predictor, fit, options)
-    return found
+    """Every fit run once: those that were begun waited for, others on the coarse mesh side by side.
 
-
-def _side_by_side(
-    machine: PreparedMachine,
-    predictor: Predictor,
-    fits: Mapping[str, Fit],
-    options: TransientOptions,
-    progress: Progress,
-) -> dict[str, FullFit]:
-    """Each fit in its own process; in this one, with a warning, if a process ends prematurely."""
+    In this process, with a warning, where another one ends prematurely.
+    """
+    served = {name: item for name, fit in fits.items() for item in begun if item.serves(fit, mesh, options)}
+    jobs = {
+        name: partial(alone, run_fit, machine, predictor, fit, options)
+        if mesh == COARSE
+        else partial(run_fit, machine, predictor, fit, options)
+        for name, fit in fits.items()
+    }
+    if mesh != COARSE or thread_count() == 1:
+        return _one_by_one(jobs, progress)
     progress(f"full model: {' and '.join(fits)}")
-    jobs = [partial(alone, run_fit, machine, predictor, fit, options) for fit in fits.values()]
+    own = [name for name in fits if name not in served]
     try:
-        answers = in_copies(jobs, len(fits))
+        found = dict(zip(own, in_copies([jobs[name] for name in own], len(own)), strict=True))
+        found |= {name: finished(predictor, fits[name], item.wait()) for name, item in served.items()}
+        return {name: found[name] for name in fits}
     except WorkerDiedError as error:
         progress(f"{error.where}: {error.what}")
-        return _one_by_one(machine, predictor, fits, options, progress)
-    return dict(zip(fits, answers, strict=True))
+        return _one_by_one(jobs, progress)
+
+
+def _one_by_one(jobs: Mapping[str, Callable[[], FullFit]], progress: Progress) -> dict[str, FullFit]:
+    found = {}
+    for name, job in jobs.items():
+        progress(f"full model: {name}")
+        found[name] = job()
+    return found
 
 
 def _is_same(one: Fit, other: Fit) -> bool:

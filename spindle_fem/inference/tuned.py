@@ -88,7 +88,7 @@ SMALLEST_DECREASE, SMALLEST_DECREASE_SHARE = 0.02, 3.0e-4
 HOPELESS_AFTER, HOPELESS_REACH = 3, 6.0
 # Where a step changes the readings as its derivatives say, but for this share, the next step uses them again,
 # with what the first one taught; so many steps in a row.
-SLOPES_HOLD, SLOPES_KEPT = 0.2, 1
+SLOPES_HOLD, SLOPES_KEPT = 0.2, 2
 # A damped step that differs from a refused one by less than this share is not tried.
 SAME_STEP_WITHIN = 0.05
 
@@ -269,10 +269,11 @@ SMEAR_SHARE, NEAR_LARGEST = 0.25, 0.8
 SEPARATES, MOSTLY = 0.9, 0.6
 
 # ------------------------------------------------------------- check by the full model (--full-model)
-# Tolerances of a step, of its coupling and of the inputs in terms of the quietest channel's noise. (In two
-# duty cycles of the recorded spindle with some 46 jumps readings are 0.4 and 0.6 of that noise, root mean
-# square, from those at a sixtieth and a tenth of the first two; half the first one leaves 0.3 and 0.6.)
-STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 20.0, 0.1, 2.0
+# Tolerances of a step (in the mean over the machine), of its coupling and of the inputs in terms of the
+# quietest channel's noise. (In two duty cycles of the recorded spindle with some 46 jumps readings are 0.6
+# and 0.8 of that noise, root mean square, from those of four times the steps; three quarters of the first one
+# leave 0.5 and 0.6, a tenth of the second one changes nothing.)
+STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 4.0, 1.0, 2.0
 
 # ------------------------------------------------------ watch (python -m validation.watch_delay)
 # Time over which what readings taught of the machine's coordinates is forgotten again, s: errors of structure

@@ -35,7 +35,8 @@ def _words(found: Mapping[str, Any]) -> str:
     text = (
         f"The same physics and parameters on the {found['preset']} mesh, {order} temperatures, "
         f"{found['unknowns']} of them, iterated with the loads through {found['before']['steps']} time steps "
-        f"before and {found['after']['steps']} after, each within {found['step_error_K']:.2g} K at any node."
+        f"before and {found['after']['steps']} after, each within "
+        f"{found['step_error_K']:.2g} K in the mean over the machine."
     )
     text += (
         " Its mesh is not that of the fast model: readings are up to "

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.errors import EnergyBalanceError, SpecError
 from spindle_fem.model.mesh.linear_solvers import Method
-from spindle_fem.model.mesh.step_control import StepControl
+from spindle_fem.model.mesh.step_control import ErrorNorm, StepControl
 from spindle_fem.model.mesh.thermal_state import ThermalState
 from spindle_fem.solvers.input_history import TEMPERATURE_RESOLUTION
 
@@ -32,7 +32,7 @@ class TransientOptions:
     Attributes
     ----------
     error : float, [K]
-        Largest estimated error of one time step at any node.
+        Estimated error of one time step.
     coupling_tolerance : float, [K]
         Change at which loads and temperatures of a stage agree.
     coefficient_tolerance : float, [-]
@@ -52,6 +52,8 @@ class TransientOptions:
         size, a multigrid hierarchy also those twice as long.
     imbalance : float or None, [-]
         Heat that may be missing in the run; what the coupling's tolerance leaves when None.
+    error_norm : {"largest", "mean"}
+        Of the error, as :class:`StepControl` takes it: at any node, or in the mean over the heat capacity.
     """
 
     error: float = 0.05
@@ -63,6 +65,7 @@ class TransientOptions:
     trust_contraction: bool = False
     method: Method | None = None
     imbalance: float | None = None
+    error_norm: ErrorNorm = "largest"
 
     def __post_init__(self) -> None:
         for name in ("error", "coupling_tolerance", "first_step", "input_resolution"):
@@ -81,6 +84,7 @@ class TransientOptions:
         """Step control of the integrator."""
         return StepControl(
             tolerance=None if self.fixed_step else self.error,
+            error_norm=self.error_norm,
             first_step=self.fixed_step or self.first_step,
             temperature_dependent=True,
             nonlinear_tolerance=self.coupling_tolerance,

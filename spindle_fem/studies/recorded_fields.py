@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import RecordingError
-from spindle_fem.inference import tuned
 from spindle_fem.inference.full_model_check import (
     COARSE,
-    FIRST_STEP,
     MOST_STEPS,
+    options_to_read,
     spec_on,
 )
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
@@ -25,21 +24,14 @@ from spindle_fem.recordings.input_samples import InputHistory
 from spindle_fem.solvers.input_history import OperatingHistory
 from spindle_fem.solvers.machine_transient import Watch, simulate_full, start_at
 from spindle_fem.solvers.prepared_machine import prepare_machine
-from spindle_fem.solvers.transient_records import TransientOptions, balanced
+from spindle_fem.solvers.transient_records import balanced
 from spindle_fem.units import ZERO_CELSIUS_K
 
 Array = NDArray[np.float64]
 
 # Views are read to a tenth of a kelvin: as closely as a diagnosis follows channels of that noise.
 READ_TO = 0.1
-OPTIONS = TransientOptions(
-    error=tuned.STEP_ERROR * READ_TO,
-    coupling_tolerance=tuned.COUPLING_ERROR * READ_TO,
-    input_resolution=tuned.INPUT_RESOLUTION * READ_TO,
-    first_step=FIRST_STEP,
-    trust_contraction=True,
-    method="multigrid",
-)
+OPTIONS = options_to_read(READ_TO)
 
 
 @dataclass(frozen=True, slots=True)

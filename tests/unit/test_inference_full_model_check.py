@@ -15,7 +15,7 @@ from spindle_fem.inference import full_model_runs
 from spindle_fem.inference.coordinate_names import PROBE_PREFIX
 from spindle_fem.inference.findings import predictions_at_stamps
 from spindle_fem.inference.full_model_check import (
-    begin_fit,
+    BegunRuns,
     expected_steps,
     full_model_errors,
     options_for,
@@ -150,13 +150,13 @@ def test_unasked_a_network_says_nothing_of_a_full_model(predictor):
 def test_time_is_followed_as_well_as_the_quietest_channel_can_tell(predictor):
     options = options_for(predictor)
     assert (options.error, options.coupling_tolerance, options.input_resolution) == pytest.approx(
-        (2.0, 0.01, 0.2), rel=1e-3
+        (0.4, 0.1, 0.2), rel=1e-3
     )
     recording = predictor.recordings[0]
     loud = SimpleNamespace(recordings=(replace(recording, sigma=10.0 * recording.sigma),))
-    assert options_for(loud).error == 4.0
+    assert options_for(loud).error == 0.8
     quiet = SimpleNamespace(recordings=(recording, replace(recording, sigma=0.3 * recording.sigma)))
-    assert options_for(quiet).error == pytest.approx(0.6, rel=0.01)
+    assert options_for(quiet).error == pytest.approx(0.12, rel=0.01)
 
 
 def test_unasked_a_full_model_of_very_many_steps_is_not_run(predictor, monkeypatch):
@@ -261,23 +261,54 @@ def test_a_fit_that_was_begun_is_run_once(predictor, monkeypatch):
         return full_model_runs.MeshRuns(tuple(seen), 7, 1.0)
 
     prepared = SimpleNamespace(spec=predictor.fast.spec, operators=SimpleNamespace(n_unknowns=3))
-    monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
+    prepared_for = []
+    monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared_for.append(spec) or prepared)
     for module in (full_model, full_model_runs):
         monkeypatch.setattr(module, "mesh_runs", mesh_runs)
     monkeypatch.setattr(full_model, "thread_count", lambda: 2)
     monkeypatch.setattr(full_model, "start_copy", lambda job: job)
     monkeypatch.setattr(full_model, "in_copies", lambda jobs, number: [job() for job in jobs])
     machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
-    assert [begin_fit(machine, predictor, nothing, mesh) for mesh in ("off", "own")] == [[], []]
-    (begun,) = begin_fit(machine, predictor, nothing)
-    assert begun.serves(moved, "coarse", begun.options)
-    assert not begun.serves(heat, "coarse", begun.options)
-    assert not begun.serves(nothing, "own", begun.options)
-    assert not begun.serves(nothing, "coarse", replace(begun.options, error=0.5))
+    for mesh in ("off", "own"):
+        unasked = BegunRuns(machine, mesh)
+        unasked.begin(predictor, nothing)
+        assert unasked.fits == []
+    begun = BegunRuns(machine)
+    begun.begin(predictor, nothing)
+    (fit,) = begun.fits
+    assert fit.serves(moved, "coarse", fit.options)
+    assert not fit.serves(heat, "coarse", fit.options)
+    assert not fit.serves(nothing, "own", fit.options)
+    assert not fit.serves(nothing, "coarse", replace(fit.options, error=0.5))
     diagnosis = diagnosis_of(predictor, nothing, heat)
     with_begun, without = (full_model_errors(diagnosis, machine, begun=item) for item in (begun, None))
     assert repr(with_begun) == repr(without)
     assert ran == [heat, nothing, nothing, heat]
+    begun.begin(predictor, heat)
+    ran.clear()
+    prepared_for.clear()
+    assert repr(full_model_errors(diagnosis, machine, begun=begun)) == repr(without)
+    assert ran == [nothing, heat]
+    ran.clear()
+    full_model_errors(diagnosis_of(predictor, nothing, nothing), machine, begun=begun)
+    assert ran == [nothing]
+    assert prepared_for == []
+
+
+def test_a_machine_that_cannot_be_meshed_ahead_is_told_where_errors_are_asked_for(predictor, monkeypatch):
+    def refused(spec):
+        raise SpecError("mesh", "no mesh.", "Another geometry.")
+
+    monkeypatch.setattr(full_model, "prepare_machine", refused)
+    monkeypatch.setattr(full_model, "thread_count", lambda: 2)
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
+    nothing, heat = fit_of((), {"heat.front": 1.1}), fit_of((), {"heat.front": 1.3})
+    begun = BegunRuns(machine)
+    begun.prepare()
+    begun.begin(predictor, nothing)
+    assert begun.fits == []
+    found = full_model_errors(diagnosis_of(predictor, nothing, heat), machine, begun=begun)
+    assert found["reason"] == "It could not be run: mesh: no mesh. Another geometry."
 
 
 def test_a_difference_of_the_meshes_is_not_one_of_what_was_found(predictor, monkeypatch):

@@ -318,6 +318,27 @@ def test_a_refused_step_finds_the_power_with_which_its_error_goes(power, most):
     assert error > 1e-4
 
 
+def test_the_mean_error_asks_for_fewer_steps_after_a_jump():
+    """A strong film comes on: the surface is far off the course of a step, the machine as a whole is not."""
+    cooled = replace(PROBLEM, films=(Film("outer.outer", 2.0e4, 273.15),))
+
+    def run(**choice):
+        return integrate(cooled, START, 600.0, control=StepControl(first_step=5.0, **choice))
+
+    largest, mean = (run(tolerance=None, error_norm=norm) for norm in ("largest", "mean"))
+    assert np.all(mean.step_errors < largest.step_errors)
+    assert np.array_equal(mean.state.temperature, largest.state.temperature)
+    assert mean.step_errors[0] < 0.5 * largest.step_errors[0]
+    every, fewer = (run(tolerance=0.02, error_norm=norm) for norm in ("largest", "mean"))
+    assert len(fewer.step_errors) < 0.85 * len(every.step_errors)
+    exact = run(tolerance=1e-4).state
+    capacity = np.append(OPERATORS.matrix(OPERATORS.sum_storage(np.full(2, 3.6e6))).sum(axis=0), 50.0)
+    apart = fewer.state.vector() - exact.vector()
+    assert np.sqrt(capacity @ apart**2 / capacity.sum()) < 0.02
+    with pytest.raises(SpecError, match=r"error_norm: 'rms'.* Allowed: largest, mean"):
+        StepControl(error_norm="rms")
+
+
 def test_one_preconditioner_serves_steps_of_many_sizes():
     result = integrate(
         PROBLEM, START, 5e4, control=StepControl(tolerance=0.01, first_step=0.5, method="multigrid")

@@ -120,6 +120,7 @@ class StageSolver:
         self._tie = own.system.tie
         self._tied_storage = storage if self._tie is None else merged(storage, self._tie)
         self._n = self._tied_storage.shape[0]
+        self._tied_content = np.concatenate((self._tied_storage @ np.ones(self._n), lumped_capacity))
         self._storage = self._beside(own)
         self._kept = _Kept(conduction=own.matrix)
         self._recent = RecentCorrections(2)
@@ -173,7 +174,7 @@ class StageSolver:
         return [first, middle, last]
 
     def step_error(self, stages: list[Stage], size: float) -> float:
-        """Estimated error of a step, largest over all nodes, [K]."""
+        """Estimated error of a step in the norm of the step control, [K]."""
         defect = error_defect(size, tuple(stage.rate for stage in stages))
         defect[self._n :][self._lumped_capacity == 0.0] = 0.0
         tolerance = ERROR_SOLVE_FRACTION * (self._control.tolerance or 1.0)
@@ -182,6 +183,9 @@ class StageSolver:
             self._kept.matrix, defect, self._kept.preconditioner, known, error_tolerance=tolerance
         )
         self.linear_iterations += solution.iterations
+        if self._control.error_norm == "mean":
+            capacity = self._tied_content
+            return float(np.sqrt(capacity @ solution.unknowns**2 / capacity.sum()))
         return float(np.abs(solution.unknowns).max(initial=0.0))
 
     def state_after(self, stages: list[Stage], end: float, step: float) -> ThermalState:
