@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import sys
@@ -335,6 +336,8 @@ def main() -> None:
     from spindle_fem.errors import SpindleFemError, of_system
 
     gc.set_threshold(COLLECT_AFTER)
+    # Else the interpreter looks for garbage once more as it ends, for half a second after a diagnosis.
+    atexit.register(gc.freeze)
     # The solver is bound by memory: more threads only wait for one another, spinning.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

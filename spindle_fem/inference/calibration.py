@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from spindle_fem.errors import RecordingError
 from spindle_fem.inference.belief import Belief, Coordinate
@@ -108,7 +108,7 @@ class Calibration:
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Every parameter with its 90 % interval."""
-        width = norm.ppf(0.5 + 0.5 * LEVEL)
+        width = ndtri(0.5 + 0.5 * LEVEL)
         found = []
         for prior, value, variance in zip(
             self.priors, self.log_factors, np.diag(self.covariance), strict=True
@@ -233,4 +233,4 @@ def prediction_interval(
     """
     from_parameters = np.einsum("ncp,pq,ncq->nc", sensitivity, covariance, sensitivity, optimize=True)
     total = from_parameters + slow.sigma**2 + np.asarray(white) ** 2
-    return norm.ppf(0.5 + 0.5 * level) * np.sqrt(total)
+    return ndtri(0.5 + 0.5 * level) * np.sqrt(total)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.calibration import LEVEL
@@ -53,7 +53,7 @@ def _row(diagnosis: Diagnosis, fit: Fit, item: Misdescription) -> dict[str, Any]
     """One direction in one fit."""
     predictor = diagnosis.predictor
     value = fit.values[item.coordinate]
-    low, high = fit.interval(item.coordinate, float(norm.ppf(0.5 + 0.5 * LEVEL)) * tuned.INTERVAL_WIDENING)
+    low, high = fit.interval(item.coordinate, float(ndtri(0.5 + 0.5 * LEVEL)) * tuned.INTERVAL_WIDENING)
     largest, channel, swing, sensor = 0.0, "", 0.0, ""
     for number, recording in enumerate(predictor.recordings):
         column = predictor.column_of(number, item.coordinate)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Hypothesis
@@ -45,7 +45,9 @@ def detection_p_value(hypotheses: Sequence[Hypothesis], trials: int, coarseness:
             # Pairs, and what is on in intervals, were chosen among so many more.
             chosen_among = max(0.0, likely - item.log_prior)
             periods, among = closer_periods(item.fit)
-            level = float(chi2.logsf(gain, max(1, freedom - periods))) + among
+            # Of a large gain the level is too small for a number.
+            with np.errstate(divide="ignore"):
+                level = float(np.log(chdtrc(max(1, freedom - periods), gain))) + among
             lowest = min(lowest, level + chosen_among)
     if lowest == 0.0:
         return 1.0

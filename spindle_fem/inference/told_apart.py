@@ -19,7 +19,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2, norm
+from scipy.special import chdtri, chndtr, ndtri
 
 from spindle_fem.inference import tuned
 
@@ -47,8 +47,8 @@ def misfit_seen(freedom: int, trials: int) -> float:
         Effects at places that a diagnosis tries.
     """
     single = -np.expm1(np.log1p(-FALSE_ALARM) / (1.0 + trials / tuned.CANDIDATES_A_TRIAL))
-    limit = float(chi2.isf(single**tuned.CHANCE_DIVISOR, freedom))
-    return float(brentq(lambda gain: ncx2.sf(limit, freedom, gain) - POWER, 1e-3, 1e4))
+    limit = float(chdtri(freedom, single**tuned.CHANCE_DIVISOR))
+    return float(brentq(lambda gain: 1.0 - chndtr(limit, freedom, gain) - POWER, 1e-3, 1e4))
 
 
 def misfit_told() -> float:
@@ -56,7 +56,7 @@ def misfit_told() -> float:
 
     The misfit of the other then exceeds the margin beyond which a diagnosis does not name both together.
     """
-    width = norm.ppf(POWER)
+    width = ndtri(POWER)
     return float((width + np.sqrt(width**2 + tuned.NEAR_MISFIT)) ** 2)
 
 

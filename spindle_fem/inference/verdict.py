@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtri
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference import tuned
@@ -43,7 +43,7 @@ CONTRADICTED_REASON = (
     "them likelier predicts the readings that were held out"
 )
 # Shift of an uncertain parameter that its prior holds with at least 1 %.
-PRIOR_SIGMAS = float(norm.ppf(0.995))
+PRIOR_SIGMAS = float(ndtri(0.995))
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +248,7 @@ def _not_named(sets: _Weighed, asked: _Asked) -> Judgement:
     # The residual is there, and no set of the catalogue makes it likelier.
     p_value, reason = sets.p_value, CONTRADICTED_REASON
     if much_left:
-        p_value = float(chi2.sf(empty.fit.misfit, len(empty.fit.residual)))
+        p_value = float(chdtrc(len(empty.fit.residual), empty.fit.misfit))
         much = f"{left:.1f} times" if left > tuned.MOST_LEFT else "more than"
         reason = f"the readings differ from the model by {much} the noise, and no effect explains it"
     return Judgement("unexplained", p_value, replace(empty, probability=0.0), (), 1.0, reason, left=left)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import THETA_BOUND, Belief
@@ -76,7 +76,7 @@ def wrong_direction(
     prior = np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(len(owned) + trials)
     gains = 0.5 * misfit / (coarseness * tuned.GAIN_DIVISOR) - 0.5 * np.log1p(WIDER**2 * left) + prior
     best = int(np.argmax(gains))
-    level = float(chi2.sf(misfit[best] / (coarseness * tuned.CHANCE_DIVISOR), 1))
+    level = float(chdtrc(1, misfit[best] / (coarseness * tuned.CHANCE_DIVISOR)))
     p_value = float(-np.expm1(len(owned) * np.log1p(-min(level, 1.0 - 1e-16))))
     return WrongDirection(owned[best], without_prior(belief, rows[best]), float(gains[best]), p_value)
 

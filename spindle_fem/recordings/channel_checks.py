@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from spindle_fem.validity import PLAUSIBLE_KELVIN
 
@@ -144,7 +144,7 @@ def slow_error(times: Array, values: Array, white: float, block: int = 16, block
     fitted = np.einsum("wbj,wj->wb", projector, np.einsum("wbj,wb->wj", projector, means))
     freedom = blocks - 3
     # a quarter of purely random windows lie below this quantile of chi-square
-    expected = float(chi2.ppf(QUIET_SHARE, freedom)) / freedom
+    expected = float(chdtri(freedom, 1.0 - QUIET_SHARE)) / freedom
     variance = np.quantile(np.sum((means - fitted) ** 2, axis=1) / freedom, QUIET_SHARE) / expected
     return float(np.sqrt(max(0.0, float(variance) - white**2 / block)))
 

@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.term import CHANNEL_FILM
@@ -152,6 +151,8 @@ class _Sampler:
 
     def random_samples(self, number: int, seed: int, sigmas: float) -> list[Sample]:
         """Latin hypercube over all parameters; the speeds take turns."""
+        from scipy.stats import qmc  # slow to load
+
         names = tuple(self.sigma)
         highest = self.options.highest_speed_of(self.spec)
         unit = qmc.LatinHypercube(max(1, len(names)), rng=seed).random(number)
