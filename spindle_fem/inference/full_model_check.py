@@ -57,6 +57,9 @@ COARSE_MESH = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
 QUIETEST, LOUDEST = 0.02, 0.2
 # First step of a run and after a jump, s: about what its error allows there.
 FIRST_STEP = 30.0
+# Share of the heat that may be missing in a run, for each kelvin of that noise: a tenth of what so coarse a
+# coupling may leave. (Two duty cycles leave a fortieth to a quarter of it.)
+IMBALANCE_PER_KELVIN = 0.01
 # Most time steps of a fit that is run unasked: it then takes about as long as the search.
 MOST_STEPS = 800
 # Further steps that a jump of an input costs.
@@ -245,6 +248,7 @@ def options_to_read(noise: float) -> TransientOptions:
         first_step=FIRST_STEP,
         trust_contraction=True,
         method="multigrid",
+        imbalance=IMBALANCE_PER_KELVIN * noise,
     )
 
 

@@ -152,6 +152,7 @@ def test_time_is_followed_as_well_as_the_quietest_channel_can_tell(predictor):
     assert (options.error, options.coupling_tolerance, options.input_resolution) == pytest.approx(
         (0.4, 0.1, 0.2), rel=1e-3
     )
+    assert options.energy_tolerance == pytest.approx(0.001, rel=1e-3)
     recording = predictor.recordings[0]
     loud = SimpleNamespace(recordings=(replace(recording, sigma=10.0 * recording.sigma),))
     assert options_for(loud).error == 0.8
