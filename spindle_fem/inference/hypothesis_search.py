@@ -240,6 +240,16 @@ class Search:
             if not self.view.switched_on(effect.name, self.view.component(spot))
         ]
 
+    def delaying(self, channel: str, seconds: float) -> list[Candidate]:
+        """Effects that may make a channel so late, s."""
+        return [
+            c
+            for c in self.candidates
+            if self.effects[c.effect].delays
+            and c.reading.channel == channel
+            and c.parameters[c.amplitude].low < seconds
+        ]
+
     def remember_cost(self, candidate: Candidate, paid: float) -> None:
         """Keep what the choice of a candidate's intervals costs, as a logarithm."""
         self._paid[identity((candidate,))] = paid

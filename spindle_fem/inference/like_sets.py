@@ -1,4 +1,4 @@
-"""Which sets name the same effects, which may stand for another, and whether a third effect is needed."""
+"""Which sets name the same effects, which may stand for another, and how needed a further effect is."""
 
 from __future__ import annotations
 
@@ -86,33 +86,25 @@ def holds(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> b
     return not left
 
 
-def with_needed_thirds(ranked: Sequence[Ranked]) -> list[Ranked]:
-    """Sets, a third effect beside two that fit less probable where held-out readings doubt it.
+def with_needed_effects(ranked: Sequence[Ranked]) -> list[Ranked]:
+    """Sets, each with an effect more than another less probable beside it, by ``FURTHER_EFFECT``.
 
-    Two that fit within the errors leave those of their laws, which a third may fit: its odds are lowered by
-    what held-out readings lack of twenty to one for it. Together the two and all their thirds keep their
-    probability.
+    Laws are not exact, and what a strong effect's law leaves a further effect may fit. A set and all that add
+    one effect to it keep their probability together. A set that adds to several is weighed beside the most
+    probable of them.
     """
-    beside: dict[frozenset, list[tuple[Ranked, float]]] = {}
-    for item in ranked:
-        pairs = [
-            other
-            for other in ranked
-            if other.fit.named_keys < item.fit.named_keys
-            and len(other.fit.named_keys) == 2
-            and other.fit.reduced_misfit < tuned.EXPLAINED**2
-        ]
-        if not pairs or item.best.heldout is None:
-            continue
-        pair = min(pairs, key=lambda other: other.best.heldout)
-        gain = 0.5 * (pair.best.heldout - item.best.heldout) / tuned.GAIN_DIVISOR
-        doubted = item.probability * float(np.exp(min(0.0, gain - tuned.LEAST_HELDOUT_GAIN)))
-        beside.setdefault(pair.fit.named_keys, [(pair, pair.probability)]).append((item, doubted))
     shares = {item.fit.named_keys: item.probability for item in ranked}
-    for group in beside.values():
-        whole, rest = sum(item.probability for item, _ in group), sum(weight for _, weight in group)
-        scale = whole / max(rest, np.finfo(float).tiny)
-        shares |= {item.fit.named_keys: weight * scale for item, weight in group}
+    for size in range(2, 1 + max(len(keys) for keys in shares)):
+        beside: dict[frozenset, list[frozenset]] = {}
+        for keys in [keys for keys in shares if len(keys) == size]:
+            smaller = [other for other in shares if other < keys and len(other) == size - 1 > 0]
+            if smaller:
+                beside.setdefault(max(smaller, key=shares.__getitem__), []).append(keys)
+        for base, richer in beside.items():
+            group = {base: shares[base]} | {keys: shares[keys] / tuned.FURTHER_EFFECT for keys in richer}
+            whole = sum(shares[keys] for keys in group)
+            scale = whole / max(sum(group.values()), np.finfo(float).tiny)
+            shares |= {keys: weight * scale for keys, weight in group.items()}
     found = [replace(item, probability=shares[item.fit.named_keys]) for item in ranked]
     return sorted(found, key=lambda item: -item.probability)
 

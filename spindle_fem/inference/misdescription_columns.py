@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate
-from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coolant_misdescriptions import coolant_misdescriptions
 from spindle_fem.inference.coordinate_names import NO_VALUES
@@ -23,7 +22,7 @@ from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.mounting_misdescriptions import mounting_misdescriptions
 from spindle_fem.inference.network_misdescriptions import network_misdescriptions
-from spindle_fem.inference.prediction import acting_in
+from spindle_fem.inference.prediction import late_channels
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.structural_misdescriptions import structural_misdescriptions
 
@@ -71,16 +70,11 @@ def columns_about(
 ) -> dict[tuple[int, str], Array]:
     """What directions do about runs with the given values, as :meth:`Predictor.misdescribed_by` takes it.
 
-    A delay of a channel does nothing where a candidate gives it one: to first order both are the same, and
-    where they are not, readings would tell apart two delays that nobody can.
+    A delay of a channel does nothing where a candidate gives it one, as :func:`late_channels` has it.
     """
     columns = {}
     for number in range(len(predictor.recordings)):
-        late = {
-            c.reading.channel
-            for c in acting_in(candidates, number)[0]
-            if c.reading and effect_of(c.effect).delays
-        }
+        late = late_channels(candidates, number)
         acting = [i for i in directions if i.recording in (None, number) and i.delays not in late]
         if acting:
             found, _ = direction_columns(BaseRun(predictor, number, values, candidates), acting)

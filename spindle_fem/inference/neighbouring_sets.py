@@ -64,13 +64,16 @@ def exchanged(search: Search) -> None:
     is tried at other spots too. To first order the forms of one law hardly differ: the others are tried in
     its place. Of a machine with geometry a sensor that lies shows what physics near it may do as well: any is
     tried in its place; and in the place of a law beside others, such as a drifting room, heat in intervals.
+    A channel that is late is tried with the other law that makes it so.
     """
     tasks: list[Task] = []
+    late: list[Task] = []
     own = {effect.name for effect in search.interval_effects}
     is_spindle = search.view.kind != "network"
     for hypothesis in [h for h in search.ranked() if h.fit.candidates][: tuned.SETS_EXCHANGED]:
         for member in hypothesis.fit.candidates:
             rest = tuple(c for c in hypothesis.fit.candidates if c is not member)
+            late += _as_late(search, hypothesis.fit, member, rest)
             if search.in_intervals(member):
                 tasks += at_other_spots(search, hypothesis.fit, member, rest)
                 tasks += _with_laws(search, rest, lambda c, rest=rest: bool(rest) or c.effect in own)
@@ -110,7 +113,24 @@ def exchanged(search: Search) -> None:
                 if is_spindle and rest and not any(search.in_intervals(c) for c in rest):
                     tasks += at_other_spots(search, hypothesis.fit, member, rest, of_each=1)
     explained = search.is_explained(search.ranked()[0])
-    search.fit_all(tasks, reach=tuned.EXCHANGED_REACH if explained else tuned.HOPELESS_SCORE)
+    reach = tuned.EXCHANGED_REACH if explained else tuned.HOPELESS_SCORE
+    search.fit_all(late, anew=True, reach=reach)
+    search.fit_all(tasks, reach=reach)
+
+
+def _as_late(search: Search, fit: Fit, member: Candidate, rest: tuple[Candidate, ...]) -> list[Task]:
+    """The delay that a member is by another law, a clock or a slow sensor.
+
+    To first order both are the same: a fit that begins from an estimate of that order may end far off.
+    """
+    if not search.effects[member.effect].delays:
+        return []
+    seconds = fit.values[member.amplitude]
+    return [
+        ((*rest, other), fit.values | {other.amplitude: seconds})
+        for other in search.delaying(member.reading.channel, seconds)
+        if other.effect != member.effect
+    ]
 
 
 def _with_laws(

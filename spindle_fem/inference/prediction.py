@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, Reading
+from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
 from spindle_fem.model.reduced.drive import Drive, inputs_at
 from spindle_fem.model.reduced.reduced_transient import TransientRun
@@ -127,3 +128,16 @@ def acting_in(candidates: Sequence[Candidate], number: int) -> tuple[tuple[Candi
 def readings_of(candidates: Sequence[Candidate]) -> list[Reading]:
     """What candidates do to sensors, in their order."""
     return [c.reading for c in candidates if c.reading is not None]
+
+
+def late_channels(candidates: Sequence[Candidate], number: int) -> set[str]:
+    """Channels that candidates make late in a recording.
+
+    To first order that is what each sensor may be late by anyway. Beside a law for it nothing is left open:
+    readings would tell apart two delays that nobody can.
+    """
+    return {
+        c.reading.channel
+        for c in acting_in(candidates, number)[0]
+        if c.reading is not None and effect_of(c.effect).delays
+    }

@@ -28,7 +28,7 @@ from spindle_fem.inference.coordinate_names import (
 from spindle_fem.inference.drive_steps import coarse_drive, even_drive
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.observations import Observation, observe
-from spindle_fem.inference.prediction import Prediction, acting_in, readings_of
+from spindle_fem.inference.prediction import Prediction, acting_in, late_channels, readings_of
 from spindle_fem.inference.priors import Prior, priors_of
 from spindle_fem.inference.recording_gaps import (
     channel_changes,
@@ -406,11 +406,11 @@ class Predictor:
         names, drive = self.recordings[number].temperature_names, self.drives[number]
         own = [(reading, NO_VALUES, ()) for reading in self.effects.readings]
         own += [(reading, values, derivatives) for reading in readings_of(acting_in(candidates, number)[0])]
-        known, slopes = self.directions_of(number)
-        kind = {item.coordinate: item.of_sensor for item in self.misdescribed}
+        (known, slopes), late = self.directions_of(number), late_channels(candidates, number)
+        kind = {item.coordinate: item.of_sensor for item in self.misdescribed if item.delays not in late}
         # What a sensor does wrong it does to what reaches it.
         for of_sensor in (False, True):
-            acting = [name if kind[name] is of_sensor else "" for name in known]
+            acting = [name if kind.get(name) is of_sensor else "" for name in known]
             predicted.add(acting, slopes, values, derivatives)
             felt = predicted.temperature.copy()
             for reading, *told in own:

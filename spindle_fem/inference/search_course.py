@@ -99,10 +99,7 @@ def _far_off(search: Search, null: Fit) -> list[Task]:
     return [
         ((candidate,), values | {item.coordinate: 0.0, candidate.amplitude: seconds})
         for item, seconds in late
-        for candidate in search.candidates
-        if search.effects[candidate.effect].delays
-        and candidate.reading.channel == item.delays
-        and candidate.parameters[candidate.amplitude].low < seconds
+        for candidate in search.delaying(item.delays, seconds)
     ]
 
 
@@ -110,7 +107,7 @@ def _beam(search: Search, best: Hypothesis, size: int) -> int:
     """How many combinations of a size are extended.
 
     A third effect beside two that fit within the errors is rare. On a machine with geometry held-out readings
-    say whether it is needed (:func:`with_needed_thirds`); in a network, a coarse picture, they do not.
+    say whether it is needed (:func:`with_needed_effects`); in a network, a coarse picture, they do not.
     """
     if not search.is_explained(best):
         return tuned.BEAM

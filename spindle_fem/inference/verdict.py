@@ -23,7 +23,7 @@ from spindle_fem.inference.like_sets import (
     leaves_unnamed,
     likeliest_first,
     may_stand_for,
-    with_needed_thirds,
+    with_needed_effects,
     without_repeats,
 )
 from spindle_fem.inference.p_value import detection_p_value, heldout_p_value
@@ -132,7 +132,7 @@ class _Weighed:
     by_fitted : mapping of keys to Ranked
         By fitted readings alone.
     by_all : mapping of keys to float
-        Probability by all readings, before like sets count as one and thirds are doubted.
+        Probability by all readings, before like sets count as one and further effects are doubted.
     ranked : list of Ranked
         The set that is named, or nothing missing, in front.
     empty : Ranked
@@ -219,7 +219,7 @@ def _weighed(hypotheses: Sequence[Hypothesis], trials: int, asked: _Asked) -> _W
     if p_value <= tuned.SIGNIFICANT and not stays:
         ranked = _without(ranked, empty)
     by_all = {item.fit.named_keys: item.probability for item in ranked}
-    told = ranked if is_coarse else with_needed_thirds(ranked)
+    told = ranked if is_coarse else with_needed_effects(ranked)
     told = likeliest_first(without_repeats(told, asked.apart), asked.overlapping)
     return _Weighed(
         every, before, {item.fit.named_keys: item for item in by_fitted}, by_all, told, empty, p_value
@@ -277,7 +277,7 @@ def _named(sets: _Weighed, asked: _Asked) -> Judgement:
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
         for item in rivals
-        # A third effect that held-out readings doubt is listed.
+        # A doubted further effect is listed.
         if (known * max(item.probability, sets.by_all[item.fit.named_keys]) >= tuned.LISTED or item in near)
         and item.fit.candidates
     )

@@ -127,6 +127,22 @@ def test_clock_shift_has_the_slope_of_the_temperature():
     assert told[:, 0] == pytest.approx(told[:, 1])
 
 
+def test_clock_shift_has_one_slope_on_both_sides_of_a_whole_number_of_steps():
+    """A fit would end there."""
+    times = np.concatenate((np.arange(0.0, 600.0, 20.0), np.arange(600.0, 3601.0, 60.0)))
+    curve = 300.0 + 5.0 * (1.0 - np.exp(-times / 200.0))
+
+    def told(shift):
+        return delayed(times, curve[:, None], np.array([shift])).real[:, 0]
+
+    before, at, after = (told(60.0 + w) for w in (-1e-3, 0.0, 1e-3))
+    inside = times > 61.0
+    assert (at - before)[inside] == pytest.approx((after - at)[inside], abs=1e-7)
+    # Between stamps a curve is met far better than by a straight line, which misses h² T''/8, 6 mK.
+    late = 300.0 + 5.0 * (1.0 - np.exp(-np.maximum(times - 10.0, 0.0) / 200.0))
+    assert np.abs(told(10.0) - late)[times > 20.0].max() < 2e-3
+
+
 def test_a_detached_sensor_goes_to_the_mix_with_the_air():
     times = np.arange(0.0, 4000.0, 1.0)
     candidate = reading_of("sensor_detached")

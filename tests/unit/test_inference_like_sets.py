@@ -7,80 +7,71 @@ import pytest
 
 from spindle_fem.inference import like_sets, tuned
 from spindle_fem.inference.hypothesis import Ranked
-from spindle_fem.inference.like_sets import are_alike, with_needed_thirds
+from spindle_fem.inference.like_sets import are_alike, with_needed_effects
 from spindle_fem.inference.set_odds import rank
 from spindle_fem.inference.verdict import NEAR_REASON
 from tests.support.made_hypotheses import CHURNING, OFFSET, PRELOAD, candidate, hypothesis, verdict
 
 
-def test_a_third_beside_two_that_fit_within_the_errors_is_less_probable_where_held_out_readings_doubt_it():
-    pair = replace(hypothesis(PRELOAD, CHURNING, misfit=400.0), heldout=500.0)
-    worse = replace(hypothesis(PRELOAD, OFFSET, misfit=420.0), heldout=700.0)
-
-    def odds(gain, two=pair):
-        """Of a third that was twice as probable, where held-out readings gain so much, as it counts."""
-        heldout = 500.0 - 2.0 * tuned.GAIN_DIVISOR * gain
-        triple = replace(hypothesis(PRELOAD, CHURNING, OFFSET, misfit=300.0), heldout=heldout)
-        ranked = with_needed_thirds([Ranked(triple, 0.6), Ranked(two, 0.3), Ranked(worse, 0.1)])
-        said = {id(item.best): item.probability for item in ranked}
-        assert list(said.values()) == sorted(said.values(), reverse=True)
-        assert said[id(triple)] + said[id(two)] == pytest.approx(0.9)
-        return said[id(triple)] / said[id(two)]
-
-    enough = tuned.LEAST_HELDOUT_GAIN
-    for gain in (enough - 4.0, enough - 1.0, enough, enough + 2.0):
-        assert odds(gain) == pytest.approx(2.0 * np.exp(min(0.0, gain - enough)))
-    # Two that leave more than errors need a third.
-    more = replace(pair, fit=replace(pair.fit, misfit=1.1 * tuned.EXPLAINED**2 * len(pair.fit.residual)))
-    assert odds(0.0, more) == pytest.approx(2.0)
-
-
-def test_each_of_two_thirds_that_read_alike_is_doubted_once():
-    pair = replace(hypothesis(PRELOAD, CHURNING, misfit=400.0), heldout=500.0)
-    # One nat less than enough, so that each counts e times less beside the pair.
-    heldout = 500.0 - 2.0 * tuned.GAIN_DIVISOR * (tuned.LEAST_HELDOUT_GAIN - 1.0)
-    one, other = (
-        replace(hypothesis(PRELOAD, CHURNING, third, misfit=300.0), heldout=heldout)
-        for third in (OFFSET, replace(OFFSET, component="SP01"))
-    )
-    ranked = with_needed_thirds([Ranked(one, 0.5), Ranked(other, 0.4), Ranked(pair, 0.1)])
+def test_a_further_effect_is_less_probable_beside_the_likeliest_set_that_lacks_it():
+    single, other = hypothesis(PRELOAD, misfit=400.0), hypothesis(CHURNING, misfit=400.0)
+    pair, twin = (hypothesis(PRELOAD, second, misfit=400.0) for second in (CHURNING, OFFSET))
+    triple = hypothesis(PRELOAD, CHURNING, OFFSET, misfit=400.0)
+    items, before = (single, other, pair, twin, triple), (0.06, 0.04, 0.3, 0.1, 0.5)
+    ranked = with_needed_effects([Ranked(*own) for own in zip(items, before, strict=True)])
+    told = [item.probability for item in ranked]
+    assert told == sorted(told, reverse=True)
+    assert sum(told) == pytest.approx(1.0)
     said = {id(item.best): item.probability for item in ranked}
-    assert sum(said.values()) == pytest.approx(1.0)
-    assert said[id(one)] / said[id(pair)] == pytest.approx(5.0 / np.e)
-    assert said[id(other)] / said[id(pair)] == pytest.approx(4.0 / np.e)
+    # Both pairs beside the single effect that they hold, the triple beside the likelier of them.
+    first, rest = 0.06 + 0.3 + 0.1, 0.06 + (0.3 + 0.1) / tuned.FURTHER_EFFECT
+    assert said[id(single)] == pytest.approx(0.06 * first / rest)
+    assert said[id(twin)] / said[id(single)] == pytest.approx(0.1 / 0.06 / tuned.FURTHER_EFFECT)
+    likelier = 0.3 / tuned.FURTHER_EFFECT * first / rest
+    assert said[id(triple)] / said[id(pair)] == pytest.approx(0.5 / likelier / tuned.FURTHER_EFFECT)
+    assert said[id(other)] == pytest.approx(0.04)
 
 
-def test_a_verdict_doubts_thirds_of_a_machine_that_is_drawn():
+def test_nothing_missing_and_sets_without_a_smaller_one_are_not_doubted():
+    nothing, pair = hypothesis(misfit=900.0), hypothesis(PRELOAD, CHURNING, misfit=400.0)
+    ranked = with_needed_effects([Ranked(pair, 0.9), Ranked(nothing, 0.1)])
+    assert [item.probability for item in ranked] == [0.9, 0.1]
+
+
+@pytest.mark.parametrize(("coarseness", "members"), [(1.0, 2), (1.1, 3)])
+def test_a_verdict_doubts_further_effects_of_a_machine_that_is_drawn(coarseness, members):
     nothing = replace(hypothesis(misfit=2000.0), heldout=900.0)
     pair = replace(hypothesis(PRELOAD, CHURNING, misfit=400.0), heldout=500.0)
     triple = replace(hypothesis(PRELOAD, CHURNING, OFFSET, misfit=380.0), heldout=500.0)
+    # Each effect lowers what is left.
+    left = dict.fromkeys(("left", "beyond"), lambda fit: {0: 1.8, 2: 1.3, 3: 1.0}[len(fit.keys)])
 
-    def likelier(coarseness):
-        """The triple, where it would be e times as probable as the pair."""
+    def found(odds):
+        """With the triple so much more probable than the pair."""
         three, two = (
             next(i.probability for i in rank([nothing, pair, triple], coarseness) if len(i.fit.keys) == size)
             for size in (3, 2)
         )
-        return replace(triple, log_prior=1.0 - float(np.log(three / two)))
+        likelier = replace(triple, log_prior=float(np.log(odds * two / three)))
+        return verdict(nothing, pair, likelier, calibrated=True, coarseness=coarseness, **left)
 
-    # Each effect lowers what is left.
-    left = dict.fromkeys(("left", "beyond"), lambda fit: {0: 1.8, 2: 1.3, 3: 1.0}[len(fit.keys)])
-    for coarseness, members in ((1.0, 2), (1.1, 3)):
-        found = verdict(nothing, pair, likelier(coarseness), calibrated=True, coarseness=coarseness, **left)
-        assert len(found.chosen.fit.keys) == members
+    assert len(found(0.5 * tuned.FURTHER_EFFECT).chosen.fit.keys) == members
+    assert len(found(2.0 * tuned.FURTHER_EFFECT).chosen.fit.keys) == 3
 
 
-def test_a_third_that_held_out_readings_doubt_is_listed_where_it_is_likely_otherwise():
-    nothing = replace(hypothesis(misfit=2000.0), heldout=900.0)
-    pair = replace(hypothesis(PRELOAD, CHURNING, misfit=400.0), heldout=500.0)
-    triple = replace(hypothesis(PRELOAD, CHURNING, OFFSET, misfit=380.0), heldout=540.0)
+@pytest.mark.parametrize(("odds", "listed"), [(0.4, [3]), (0.001, [])])
+def test_a_doubted_effect_is_listed_where_it_is_likely_otherwise(odds, listed):
+    nothing = hypothesis(misfit=2000.0)
+    pair, triple = (
+        hypothesis(PRELOAD, CHURNING, misfit=400.0),
+        hypothesis(PRELOAD, CHURNING, OFFSET, misfit=380.0),
+    )
     shares = {len(i.fit.keys): i.probability for i in rank([nothing, pair, triple], 1.0)}
-    even = -float(np.log(shares[3] / shares[2]))
-    for log_odds, listed in ((1.0, [3]), (-6.0, [])):
-        found = verdict(nothing, pair, replace(triple, log_prior=even + log_odds), calibrated=True)
-        assert len(found.chosen.fit.keys) == 2
-        assert [len(i.fit.keys) for i in found.alternatives] == listed
-        assert all(i.probability < 0.02 for i in found.alternatives)
+    likely = replace(triple, log_prior=float(np.log(odds * shares[2] / shares[3])))
+    found = verdict(nothing, pair, likely, calibrated=True)
+    assert len(found.chosen.fit.keys) == 2
+    assert [len(i.fit.keys) for i in found.alternatives] == listed
+    assert all(i.probability < tuned.LISTED for i in found.alternatives)
 
 
 def test_what_is_likelier_at_places_that_count_as_one_is_named_first():

@@ -249,7 +249,7 @@ def test_held_out_readings_tell_sets_apart_that_read_alike(heldout, expected):
 
 def test_the_same_elsewhere_in_a_set_and_sets_of_another_size_are_no_rivals():
     elsewhere = hypothesis(candidate("thermal_preload", "F1"), misfit=410.0)
-    pair = hypothesis(PRELOAD, CHURNING, misfit=399.0)
+    pair = hypothesis(PRELOAD, CHURNING, misfit=410.0)
     one = {"front_bearings": frozenset({"front_bearings", "F1"})}
     found = verdict(*LIKE[:2], elsewhere, pair, overlapping=one, apart=lambda one, other: 0.0)
     assert found.verdict == "missing_physics"
@@ -265,7 +265,8 @@ def test_physics_comes_before_parameters_before_sensors():
 
 def test_what_all_likely_sets_hold_is_named_whether_there_is_more_or_not():
     null, one = hypothesis(misfit=2000.0), hypothesis(PRELOAD, misfit=400.0)
-    more = [hypothesis(PRELOAD, OFFSET, misfit=400.0, evidence=one.fit.log_evidence + 1.0)]
+    needed = 1.0 + float(np.log(tuned.FURTHER_EFFECT))
+    more = [hypothesis(PRELOAD, OFFSET, misfit=400.0, evidence=one.fit.log_evidence + needed)]
     other = [hypothesis(CHURNING, misfit=400.0, evidence=one.fit.log_evidence)]
     assert verdict(null, one, *other, calibrated=True).verdict == "ambiguous"
     sure = verdict(null, one, *more, calibrated=True)

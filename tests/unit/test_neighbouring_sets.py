@@ -35,6 +35,7 @@ class NotingSearch:
     """The best set is the first of the candidates; every law explains as much to first order."""
 
     interval_effects = ()
+    effects = dict.fromkeys(("drift", "radiation", "lag"), SimpleNamespace(delays=False))
     view = SimpleNamespace(kind="machine", groups=(), sets={})
 
     def __init__(self, candidates=(HUMP, RAMP, BESIDE, ELSEWHERE)) -> None:
@@ -71,9 +72,9 @@ class NotingSearch:
         """The set that would be fitted."""
         return (*fit.candidates, *(variant.candidate for variant, _ in additions)), {}
 
-    def fit_all(self, tasks, again=False, reach=0.0):
+    def fit_all(self, tasks, anew=False, reach=0.0):
         """Note what is asked."""
-        self.asked = {identity(candidates) for candidates, _ in tasks}
+        self.asked |= {identity(candidates) for candidates, _ in tasks}
 
 
 def test_other_forms_and_laws_at_its_place_are_tried_in_the_place_of_a_law():

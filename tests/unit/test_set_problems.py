@@ -1,6 +1,7 @@
 """What drawings leave open, about the machine with each set: on the lumped spindle."""
 
 import copy
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,7 @@ from spindle_fem.inference.coolant_misdescriptions import StandingCoolant
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX
 from spindle_fem.inference.heat_misdescriptions import SpeedShape
 from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
@@ -98,6 +100,12 @@ def test_a_channel_has_one_delay_only(case, problem):
     values = {late["SP02"].amplitude: 60.0}
     about = with_misdescriptions(problem.predictor, responses, values, [late["SP02"]])
     assert {d.delays for d in responses if about.column_of(0, d.coordinate) is None} == {"SP02"}
+    # So it is where a search uses what delays do of a machine without any.
+    delays = {d.coordinate: 20.0 for d in responses}
+    late_too, alone = (plain.predict(0, values | more, [late["SP02"]]).temperature for more in (delays, {}))
+    changed = np.abs(late_too - alone).max(axis=0)
+    changed = dict(zip(case.blank.temperature_names, changed, strict=False))
+    assert changed["SP02"] == 0.0 < changed["SP01"]
     fits = [problem.fit([one], {one.amplitude: 60.0}, iterations=0) for one in late.values()]
     assert combination_of(fits[0]) != combination_of(fits[1])
 
@@ -175,6 +183,7 @@ def test_a_large_delay_of_a_sensor_is_tried_as_its_effects(case, seconds, tried)
     null = problem.fit((), {late.coordinate: value}, iterations=0)
 
     search = SimpleNamespace(problem=problem, candidates=candidates_for(case.view), effects=catalogue())
+    search.delaying = partial(Search.delaying, search)
     tasks = search_course._far_off(search, null)
     assert {members[0].effect for members, _ in tasks} == tried
     for (member,), start in tasks:

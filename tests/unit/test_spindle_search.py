@@ -6,7 +6,7 @@ import pytest
 
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
-from spindle_fem.inference import search_course, tuned
+from spindle_fem.inference import neighbouring_sets, search_course, tuned
 from spindle_fem.inference.final_fits import few_of_each
 from spindle_fem.inference.findings import findings_of
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked, identity
@@ -81,6 +81,41 @@ def test_all_that_a_lying_sensor_may_do_is_tried_in_the_place_of_what_was_found(
     own = {identity((c,)) for c in lies if c is not late}
     assert len(own) > tuned.EFFECTS_EXCHANGED
     assert own <= tried
+
+
+@pytest.mark.parametrize(("law", "other"), [("clock_shift", "sensor_lag"), ("sensor_lag", "clock_shift")])
+def test_a_late_channel_is_tried_as_late_by_the_other_law_from_the_same_delay(case, heated, law, other):
+    """Known from a fit that ended far off, it is fitted again."""
+
+    class Noting(Search):
+        def fit_all(self, tasks, **how):
+            begun.append((tasks, how))
+
+    begun = []
+    search = search_over(case, heated, Noting)
+    late = {
+        name: next(c for c in search.candidates if (c.effect, c.component) == (name, "SP02"))
+        for name in (law, other)
+    }
+    search.found = {}
+    search.keep(Hypothesis(search.problem.fit(), -1e3))
+    chosen = search.problem.fit((late[law],), {late[law].amplitude: 90.0}, iterations=0)
+    search.keep(Hypothesis(chosen, 0.0))
+    search.keep(
+        Hypothesis(search.problem.fit((late[other],), {late[other].amplitude: 9.0}, iterations=0), -1e3)
+    )
+    exchanged(search)
+    ((members, start),), how = begun[0]
+    assert members == (late[other],)
+    assert start[late[other].amplitude] == 90.0
+    assert how["anew"]
+
+
+def test_a_channel_that_is_early_is_not_tried_as_a_slow_sensor(case, heated):
+    search = search_over(case, heated)
+    clock = next(c for c in search.candidates if (c.effect, c.component) == ("clock_shift", "SP02"))
+    early = search.problem.fit((clock,), {clock.amplitude: -90.0}, iterations=0)
+    assert neighbouring_sets._as_late(search, early, clock, ()) == []
 
 
 def test_places_of_one_combination_hide_no_other():

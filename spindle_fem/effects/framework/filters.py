@@ -1,9 +1,10 @@
-"""First-order lag and delay of readings at any stamps, exact for straight lines between them."""
+"""First-order lag, exact for straight lines between the stamps, and delay of readings at any stamps."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
@@ -66,7 +67,10 @@ def scan(keep: Complex, gain: Complex, first: Complex) -> Complex:
 
 
 def delayed(times: Array, values: ArrayLike, shift: ArrayLike) -> Complex:
-    """Values ``shift`` seconds earlier, on straight lines; the ends go on as they are.
+    """Values ``shift`` seconds earlier, on smooth curves; the ends go on as they are.
+
+    Cubic between the stamps, with the slopes of parabolas through three of them: on straight lines a fit of a
+    shift ends where it is a whole number of steps.
 
     Parameters
     ----------
@@ -88,15 +92,11 @@ def delayed(times: Array, values: ArrayLike, shift: ArrayLike) -> Complex:
     if len(times) < 2:
         return x.copy()
     found = np.empty_like(x)
+    slopes = np.gradient(x, times, axis=0)
     for amount in np.unique(late.real):
         chosen = np.flatnonzero(late.real == amount)
-        wanted = times - amount
-        left = np.clip(np.searchsorted(times, wanted, side="right") - 1, 0, len(times) - 2)
-        part = (wanted - times[left]) / (times[left + 1] - times[left])
-        outside = (part < 0.0) | (part > 1.0)
-        part = np.clip(part, 0.0, 1.0)[:, None]
-        own = x[:, chosen]
-        rise = own[left + 1] - own[left]
-        slope = np.where(outside[:, None], 0.0, rise / (times[left + 1] - times[left])[:, None])
-        found[:, chosen] = own[left] + part * rise - 1j * late[chosen].imag * slope
+        curve = CubicHermiteSpline(times, x[:, chosen], slopes[:, chosen])
+        wanted = np.clip(times - amount, times[0], times[-1])
+        inside = (wanted == times - amount)[:, None]
+        found[:, chosen] = curve(wanted) - 1j * late[chosen].imag * np.where(inside, curve(wanted, 1), 0.0)
     return found
