@@ -118,24 +118,31 @@ def likeliest_first(ranked: Sequence[Ranked], overlapping: Mapping[str, frozense
     return [front, *(item for item in ranked if item is not front)]
 
 
-def without_repeats(ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], float]) -> list[Ranked]:
-    """Sets without those whose law only repeats that of another, which gets their probability.
+def without_repeats(
+    ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], float], overlapping: Mapping[str, frozenset[str]]
+) -> list[Ranked]:
+    """Sets without those that say the same as another, which gets their probability.
 
     A gap that closes with temperature is, at some of its values, a contact that conducts less. Where both
     read the same within a tenth of the noise, or the gap makes the readings no likelier, they say the same,
-    one of them with fewer values.
+    one of them with fewer values. Likewise heat without a name where a law of its place reads the same within
+    the noise, and the readings say little between them.
     """
     left = {id(item): item.probability for item in ranked}
+
+    def says_the_same(item: Ranked, other: Ranked) -> bool:
+        gain = gain_over(item.best, other.best)
+        if _repeats(item.fit, other.fit):
+            return gain <= 0.0 or apart(item.fit, other.fit) < tuned.SAME_READINGS
+        if not leaves_unnamed(item.fit, other.fit, overlapping):
+            return False
+        little = 0.5 * gain / tuned.GAIN_DIVISOR_IN_A_SIZE < tuned.LEAST_HELDOUT_GAIN
+        return little and apart(item.fit, other.fit) < tuned.NEAR_READINGS
+
     for item in ranked:
-        simpler = [
-            other
-            for other in ranked
-            if id(other) in left
-            and _repeats(item.fit, other.fit)
-            and (apart(item.fit, other.fit) < tuned.SAME_READINGS or gain_over(item.best, other.best) <= 0.0)
-        ]
-        if simpler:
-            left[id(simpler[0])] += left.pop(id(item))
+        plainer = [other for other in ranked if id(other) in left and says_the_same(item, other)]
+        if plainer:
+            left[id(plainer[0])] += left.pop(id(item))
     found = [replace(item, probability=left[id(item)]) for item in ranked if id(item) in left]
     return sorted(found, key=lambda item: -item.probability)
 

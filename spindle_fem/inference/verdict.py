@@ -220,7 +220,8 @@ def _weighed(hypotheses: Sequence[Hypothesis], trials: int, asked: _Asked) -> _W
         ranked = _without(ranked, empty)
     by_all = {item.fit.named_keys: item.probability for item in ranked}
     told = ranked if is_coarse else with_needed_effects(ranked)
-    told = likeliest_first(without_repeats(told, asked.apart), asked.overlapping)
+    told = without_repeats(told, asked.apart, asked.overlapping)
+    told = likeliest_first(told, asked.overlapping)
     return _Weighed(
         every, before, {item.fit.named_keys: item for item in by_fitted}, by_all, told, empty, p_value
     )

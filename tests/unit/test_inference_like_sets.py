@@ -130,14 +130,23 @@ def test_heat_without_a_name_is_no_rival_for_a_law_at_its_place(monkeypatch):
     places = ("front_bearings", "F1", "F2")
     alike = {"apart": lambda one, other: 0.0, "overlapping": dict.fromkeys(places, frozenset(places))}
 
-    def said(law, place, *beside):
-        heat = hypothesis(candidate("unrecorded_heat_source", place), *beside, misfit=400.0, log_prior=-2.5)
+    def said(law, place, *beside, misfit=400.0, log_prior=-2.5):
+        source = candidate("unrecorded_heat_source", place)
+        heat = hypothesis(source, *beside, misfit=misfit, log_prior=log_prior)
         return verdict(hypothesis(misfit=1400.0), hypothesis(law, *beside, misfit=400.0), heat, **alike)
 
     assert [said(CHURNING, place).verdict for place in ("front_bearings", "F2")] == ["missing_physics"] * 2
     assert said(CHURNING, "F2", OFFSET).verdict == "missing_physics"
-    (listed,) = said(CHURNING, "F2").alternatives
-    assert listed.fit.candidates[0].effect == "unrecorded_heat_source"
+    # Though it is likelier the law is told, with the probability of both, unless the readings speak for it.
+    named = said(CHURNING, "F2", log_prior=2.0)
+    assert named.chosen.fit.candidates == (CHURNING,)
+    assert named.evidence > 0.99
+    assert not named.alternatives
+    spoken = 2.0 * tuned.GAIN_DIVISOR_IN_A_SIZE * tuned.LEAST_HELDOUT_GAIN
+    assert said(CHURNING, "F2", misfit=400.1 - spoken, log_prior=2.0).chosen.fit.candidates == (CHURNING,)
+    heat = said(CHURNING, "F2", misfit=399.9 - spoken, log_prior=2.0)
+    assert heat.chosen.fit.candidates[0].effect == "unrecorded_heat_source"
+    assert [item.fit.candidates for item in heat.alternatives] == [(CHURNING,)]
     assert (said(CHURNING, "nose").verdict, said(CHURNING, "nose").reason) == ("ambiguous", NEAR_REASON)
     assert said(candidate("sensor_gain", "F2", "sensor"), "F2").verdict == "ambiguous"
     assert said(candidate("unrecorded_cooling"), "front_bearings").verdict == "ambiguous"
