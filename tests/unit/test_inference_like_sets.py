@@ -146,7 +146,6 @@ def test_heat_without_a_name_is_no_rival_for_a_law_at_its_place(monkeypatch):
     assert said(CHURNING, "F2", misfit=400.1 - spoken, log_prior=2.0).chosen.fit.candidates == (CHURNING,)
     heat = said(CHURNING, "F2", misfit=399.9 - spoken, log_prior=2.0)
     assert heat.chosen.fit.candidates[0].effect == "unrecorded_heat_source"
-    assert [item.fit.candidates for item in heat.alternatives] == [(CHURNING,)]
     assert (said(CHURNING, "nose").verdict, said(CHURNING, "nose").reason) == ("ambiguous", NEAR_REASON)
     assert said(candidate("sensor_gain", "F2", "sensor"), "F2").verdict == "ambiguous"
     assert said(candidate("unrecorded_cooling"), "front_bearings").verdict == "ambiguous"
