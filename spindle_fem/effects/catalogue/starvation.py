@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from spindle_fem.effects.catalogue.heat_scale import HeatScale
 from spindle_fem.effects.framework.card import Card, Makes
 from spindle_fem.effects.framework.effect import Candidate, Effect, Reported, capital, place_words, quantity
 from spindle_fem.effects.framework.laws import (
@@ -82,6 +83,7 @@ class Starvation(Effect):
 
     name = "starvation"
     kind = "missing_physics"
+    repeats = HeatScale.name
     title = "friction changes above a certain speed, where the grease no longer refills the tracks"
     check = (
         "Grease quantity, age and bleeding; ramp the speed slowly through the onset and watch drag torque, "
