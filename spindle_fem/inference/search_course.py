@@ -106,8 +106,8 @@ def _far_off(search: Search, null: Fit) -> list[Task]:
 def _beam(search: Search, best: Hypothesis, size: int) -> int:
     """How many combinations of a size are extended.
 
-    A third effect beside two that fit within the errors is rare. On a machine with geometry held-out readings
-    say whether it is needed (:func:`with_needed_effects`); in a network, a coarse picture, they do not.
+    A third effect beside two that fit within the errors is rare. On a machine with geometry its odds say
+    whether it is needed (:func:`with_needed_effects`); in a network, a coarse picture, they do not.
     """
     if not search.is_explained(best):
         return tuned.BEAM
