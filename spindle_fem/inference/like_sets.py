@@ -124,7 +124,7 @@ def without_repeats(
     """Sets without those that say the same as another, which gets their probability.
 
     A gap that closes with temperature is, at some of its values, a contact that conducts less. Where both
-    read the same within a tenth of the noise, or the gap makes the readings no likelier, they say the same,
+    read the same within a fifth of the noise, or the gap makes the readings no likelier, they say the same,
     one of them with fewer values. Likewise heat without a name where a law of its place reads the same within
     the noise, and the readings say little between them.
     """

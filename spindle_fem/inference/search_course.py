@@ -63,6 +63,7 @@ def run_search(search: Search, begin: Mapping[str, float]) -> list[Hypothesis]:
             screened, intervals = search.screened(hypothesis.fit)
             beside = not is_network and hypothesis is best
             search.extend(hypothesis.fit, screened, intervals, 1, tuned.ADDITIONS, beside=beside)
+            search.fit_all(_far_off(search, hypothesis.fit))
     if not is_network:
         _intervals_again(search)
     improve(search)
@@ -85,21 +86,22 @@ def _pulled_far_off(null: Fit, is_network: bool) -> bool:
     return null.reduced_misfit > tuned.DISTORTED**2 or (departs and not is_network)
 
 
-def _far_off(search: Search, null: Fit) -> list[Task]:
-    """Effects that make a channel late, where the fit of nothing missing takes a large one for a small error.
+def _far_off(search: Search, fit: Fit) -> list[Task]:
+    """A set with effects that make a channel late, where its fit takes a large one for a small error.
 
     To first order what it has of the error is as good as the effect, so that a screening does not show it.
     """
-    values = null.values
+    values = fit.values
     late = [
         (item, values[item.coordinate])
         for item in search.problem.predictor.misdescribed
         if item.delays and abs(values.get(item.coordinate, 0.0)) > tuned.FAR_OFF * item.sigma
     ]
     return [
-        ((candidate,), values | {item.coordinate: 0.0, candidate.amplitude: seconds})
+        ((*fit.candidates, candidate), values | {item.coordinate: 0.0, candidate.amplitude: seconds})
         for item, seconds in late
         for candidate in search.delaying(item.delays, seconds)
+        if candidate not in fit.candidates
     ]
 
 

@@ -190,3 +190,11 @@ def test_a_large_delay_of_a_sensor_is_tried_as_its_effects(case, seconds, tried)
         assert member.component == "SP02"
         assert start[member.amplitude] == pytest.approx(value)
         assert start[late.coordinate] == 0.0
+    # Beside a set likewise, but for an effect that it holds.
+    beside = next(c for c in search.candidates if (c.effect, c.component) == ("clock_shift", "SP01"))
+    for held in ((beside,), (beside, *(members[0] for members, _ in tasks))):
+        fit = problem.fit(held, {late.coordinate: value}, iterations=0)
+        fit.position[[c.name for c in fit.coordinates].index(late.coordinate)] = value / late.sigma
+        found = search_course._far_off(search, fit)
+        assert all(members[:-1] == held for members, _ in found)
+        assert {members[-1].effect for members, _ in found} == (tried if held == (beside,) else set())
