@@ -63,6 +63,11 @@ def to_be_fitted(
         for size in range(1, len(members) + 1):
             laws = [h for h in ranked if len(h.keys) == size and not free_in_time(h.fit)]
             chosen += [h for h in laws[: tuned.LAWS_REFITTED] if h not in chosen]
+    if coarseness > 1.0:
+        # What leaves least of a coarse machine is told, though other sets are likelier.
+        for size in range(1, 1 + max(len(h.keys) for h in ranked)):
+            own = [h for h in ranked if len(h.keys) == size]
+            chosen += [h for h in sorted(own, key=lambda h: h.fit.misfit_with_prior)[:1] if h not in chosen]
     rivals = [
         h
         for h in ranked
