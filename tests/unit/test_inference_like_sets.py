@@ -1,11 +1,13 @@
 """Sets that are one for a decision, and effects that have to be needed beside others."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from spindle_fem.inference import like_sets, tuned
+from spindle_fem.inference.final_fits import to_be_fitted
 from spindle_fem.inference.hypothesis import Ranked
 from spindle_fem.inference.like_sets import are_alike, with_needed_effects
 from spindle_fem.inference.set_odds import rank
@@ -202,3 +204,13 @@ def test_a_law_that_only_repeats_a_constant_one_at_its_place_is_no_rival(law, co
         rich, apart = found(place, distance)
         assert apart.verdict == "ambiguous"
         assert {id(i.fit) for i in (apart.chosen, *apart.alternatives)} == {id(rich.fit), id(constant.fit)}
+
+
+@pytest.mark.parametrize(("coarseness", "fitted"), [(3.0, True), (1.0, False)])
+def test_what_leaves_least_of_a_network_is_fitted_to_the_end_though_others_are_likelier(coarseness, fitted):
+    # Far enough apart that none reads as the first does.
+    others = [hypothesis(candidate("windage", f"part {i}"), misfit=430.0 + 30.0 * i) for i in range(9)]
+    least = hypothesis(CHURNING, OFFSET, misfit=300.0, log_prior=-400.0)
+    found = [hypothesis(misfit=1400.0), hypothesis(PRELOAD, misfit=400.0), *others, least]
+    problem = SimpleNamespace(predictor=None, slow=None, belief=None)
+    assert (least in to_be_fitted(problem, found, {}, coarseness)) is fitted
