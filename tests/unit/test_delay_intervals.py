@@ -15,8 +15,9 @@ def test_an_interval_of_a_delay_holds_the_sensor_s_own_and_no_lag_is_negative(tm
     (found,) = diagnosis.final.candidates
     told = reported_parameters(diagnosis.final, found)[name]
     low, high = diagnosis.final.interval(amplitude_name(found), 1.0)
-    # 90 % of a normal distribution are within 1.64 standard deviations, here of the sensor and of the fit.
-    apart = 1.64 * np.hypot(tuned.RESPONSE_SIGMA, 0.5 * (high - low))
+    # 90 % of a normal distribution are within 1.64 standard deviations, here of the sensor and of the fit as
+    # intervals have it.
+    apart = 1.64 * np.hypot(tuned.RESPONSE_SIGMA, 0.5 * tuned.INTERVAL_WIDENING * (high - low))
     least = told["value"] - apart
     assert told["high"] == pytest.approx(told["value"] + apart, abs=2.0)
     assert told["low"] == pytest.approx(max(0.0, least) if effect == "sensor_lag" else least, abs=2.0)
