@@ -119,25 +119,29 @@ def likeliest_first(ranked: Sequence[Ranked], overlapping: Mapping[str, frozense
 
 
 def without_repeats(
-    ranked: Sequence[Ranked], apart: Callable[[Fit, Fit], float], overlapping: Mapping[str, frozenset[str]]
+    ranked: Sequence[Ranked],
+    apart: Callable[[Fit, Fit], float],
+    overlapping: Mapping[str, frozenset[str]],
+    coarseness: float,
 ) -> list[Ranked]:
     """Sets without those that say the same as another, which gets their probability.
 
     A gap that closes with temperature is, at some of its values, a contact that conducts less. Where both
     read the same within a fifth of the noise, or the gap makes the readings no likelier, they say the same,
     one of them with fewer values. Likewise heat without a name where a law of its place reads the same within
-    the noise, and the readings say little between them.
+    half the noise, and the readings say little between them.
     """
     left = {id(item): item.probability for item in ranked}
 
     def says_the_same(item: Ranked, other: Ranked) -> bool:
-        gain = gain_over(item.best, other.best)
+        told = told_by_readings(item.best, other.best, coarseness)
         if _repeats(item.fit, other.fit):
-            return gain <= 0.0 or apart(item.fit, other.fit) < tuned.SAME_READINGS
-        if not leaves_unnamed(item.fit, other.fit, overlapping):
-            return False
-        little = 0.5 * gain / tuned.GAIN_DIVISOR_IN_A_SIZE < tuned.LEAST_HELDOUT_GAIN
-        return little and apart(item.fit, other.fit) < tuned.NEAR_READINGS
+            return told <= 0.0 or apart(item.fit, other.fit) < tuned.SAME_READINGS
+        return (
+            leaves_unnamed(item.fit, other.fit, overlapping)
+            and told < tuned.LEAST_HELDOUT_GAIN
+            and apart(item.fit, other.fit) < tuned.NEAR_READINGS
+        )
 
     for item in ranked:
         plainer = [other for other in ranked if id(other) in left and says_the_same(item, other)]
@@ -147,12 +151,16 @@ def without_repeats(
     return sorted(found, key=lambda item: -item.probability)
 
 
-def gain_over(one: Hypothesis, other: Hypothesis) -> float:
-    """How much less misfit a set has than another, of fitted and, where both have them, held-out readings."""
-    gain = other.misfit - one.misfit
-    if one.heldout is not None and other.heldout is not None:
-        gain += other.heldout - one.heldout
-    return gain
+def told_by_readings(chosen: Hypothesis, other: Hypothesis, coarseness: float) -> float:
+    """Logarithm of the odds of a set over another of its size by all readings, whatever was likely before.
+
+    Held-out readings, where both have them, count as fitted ones do, which are three times as many; both less
+    where the model is coarse, as :func:`spindle_fem.inference.set_odds.tempered` has it.
+    """
+    gain = other.misfit - chosen.misfit
+    if chosen.heldout is not None and other.heldout is not None:
+        gain += other.heldout - chosen.heldout
+    return 0.5 * gain / (tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness)))
 
 
 def _repeats(fit: Fit, other: Fit) -> bool:

@@ -18,11 +18,11 @@ from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.like_sets import (
     are_alike,
     as_one,
-    gain_over,
     holds,
     leaves_unnamed,
     likeliest_first,
     may_stand_for,
+    told_by_readings,
     with_needed_effects,
     without_repeats,
 )
@@ -220,7 +220,7 @@ def _weighed(hypotheses: Sequence[Hypothesis], trials: int, asked: _Asked) -> _W
         ranked = _without(ranked, empty)
     by_all = {item.fit.named_keys: item.probability for item in ranked}
     told = ranked if is_coarse else with_needed_effects(ranked)
-    told = without_repeats(told, asked.apart, asked.overlapping)
+    told = without_repeats(told, asked.apart, asked.overlapping, coarseness)
     told = likeliest_first(told, asked.overlapping)
     return _Weighed(
         every, before, {item.fit.named_keys: item for item in by_fitted}, by_all, told, empty, p_value
@@ -327,7 +327,7 @@ def _near(chosen: Ranked, rivals: Sequence[Ranked], sets: _Weighed, asked: _Aske
         if any(are_alike(item.fit, fit, asked.overlapping) for fit in likely)
         and may_stand_for(item.fit, chosen.fit, asked.overlapping)
         and not leaves_unnamed(item.fit, chosen.fit, asked.overlapping)
-        and _told_by_readings(chosen.best, item.best, asked.coarseness) < tuned.LEAST_HELDOUT_GAIN
+        and told_by_readings(chosen.best, item.best, asked.coarseness) < tuned.LEAST_HELDOUT_GAIN
         and asked.apart(chosen.fit, item.fit) < tuned.NEAR_READINGS
     ]
 
@@ -364,15 +364,6 @@ def _heldout_gain(chosen: Hypothesis, empty: Hypothesis) -> float:
     if chosen.heldout is None or empty.heldout is None:
         return 0.0
     return 0.5 * (empty.heldout - chosen.heldout) / tuned.GAIN_DIVISOR
-
-
-def _told_by_readings(chosen: Hypothesis, other: Hypothesis, coarseness: float) -> float:
-    """Logarithm of the odds of a set over another of its size by all readings, whatever was likely before.
-
-    Held-out readings count as fitted ones do, which are three times as many; both less where the model is
-    coarse, as :func:`tempered` has it.
-    """
-    return 0.5 * gain_over(chosen, other) / (tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness)))
 
 
 def _log_odds(item: Ranked, empty: Ranked) -> float:
