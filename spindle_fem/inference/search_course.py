@@ -90,8 +90,10 @@ def _far_off(search: Search, fit: Fit) -> list[Task]:
     """A set with effects that make a channel late, where its fit takes a large one for a small error.
 
     To first order what it has of the error is as good as the effect, so that a screening does not show it.
+    An effect that lowered nothing beside nothing missing is not tried again beside others.
     """
     values = fit.values
+    nothing = search.found[identity(())].fit.misfit_with_prior
     late = [
         (item, values[item.coordinate])
         for item in search.problem.predictor.misdescribed
@@ -102,6 +104,8 @@ def _far_off(search: Search, fit: Fit) -> list[Task]:
         for item, seconds in late
         for candidate in search.delaying(item.delays, seconds)
         if candidate not in fit.candidates
+        if (alone := search.found.get(identity((candidate,)))) is None
+        or alone.fit.misfit_with_prior < nothing
     ]
 
 
