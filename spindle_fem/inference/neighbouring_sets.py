@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -12,6 +13,7 @@ from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
+from spindle_fem.inference.hidden_states import without
 from spindle_fem.inference.hypothesis import identity
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import Search, Task
@@ -57,65 +59,81 @@ def reduced(search: Search) -> None:
 def exchanged(search: Search) -> None:
     """Try other effects in the place of each member of the best sets.
 
-    The linearised screening misjudges a large effect, so that the right one
-    may not have passed it. Unrecorded heat in intervals fits almost anything:
-    it is tried at other spots, and beside other effects any effect that
-    follows a law is tried in its place. Where it follows a recorded quantity it
-    is tried at other spots too. To first order the forms of one law hardly differ: the others are tried in
-    its place. Of a machine with geometry a sensor that lies shows what physics near it may do as well: any is
-    tried in its place; and in the place of a law beside others, such as a drifting room, heat in intervals.
+    The linearised screening misjudges a large effect, so that the right one may not have passed it.
     A channel that is late is tried with the other law that makes it so.
     """
+    explained = search.is_explained(search.ranked()[0])
+    reach = tuned.EXCHANGED_REACH if explained else tuned.HOPELESS_SCORE
+    is_network = search.problem.predictor.is_network
     tasks: list[Task] = []
     late: list[Task] = []
-    own = {effect.name for effect in search.interval_effects}
-    is_spindle = search.view.kind != "network"
     for hypothesis in [h for h in search.ranked() if h.fit.candidates][: tuned.SETS_EXCHANGED]:
         for member in hypothesis.fit.candidates:
             rest = tuple(c for c in hypothesis.fit.candidates if c is not member)
             late += _as_late(search, hypothesis.fit, member, rest)
-            if search.in_intervals(member):
-                tasks += at_other_spots(search, hypothesis.fit, member, rest)
-                tasks += _with_laws(search, rest, lambda c, rest=rest: bool(rest) or c.effect in own)
+            if is_network:
+                tasks += _of_neighbours(search, hypothesis.fit, member, rest)
             else:
-                if member.effect in own:
-                    tasks += _with_laws(
-                        search,
-                        rest,
-                        lambda c, member=member: c.effect in own and c.component != member.component,
-                    )
-                tasks += _with_laws(
-                    search,
-                    rest,
-                    lambda c, member=member: (
-                        (c.effect, c.component) == (member.effect, member.component) and c.form != member.form
-                    ),
-                )
-                places = _beside(search, member.component)
-                tasks += _with_laws(
-                    search,
-                    rest,
-                    lambda c, places=places, member=member: (
-                        (c.component in places and c.effect != member.effect)
-                        or (is_spindle and member.kind == SENSOR != c.kind)
-                    ),
-                )
-                if is_spindle and member.kind == SENSOR:
-                    # Physics near it may crowd out what else its sensor may do wrong.
-                    tasks += _with_laws(
-                        search,
-                        rest,
-                        lambda c, member=member: (
-                            (c.kind, c.component) == (SENSOR, member.component) and c.effect != member.effect
-                        ),
-                        len(search.candidates),
-                    )
-                if is_spindle and rest and not any(search.in_intervals(c) for c in rest):
-                    tasks += at_other_spots(search, hypothesis.fit, member, rest, of_each=1)
-    explained = search.is_explained(search.ranked()[0])
-    reach = tuned.EXCHANGED_REACH if explained else tuned.HOPELESS_SCORE
+                tasks += _in_place_of(search, hypothesis.fit, member, rest, reach)
     search.fit_all(late, anew=True, reach=reach)
     search.fit_all(tasks, reach=reach)
+
+
+def _in_place_of(
+    search: Search, fit: Fit, member: Candidate, rest: tuple[Candidate, ...], reach: float
+) -> list[Task]:
+    """Fits with what may do what one member of a set does, to first order about the set as it was fitted.
+
+    There the machine is as it is known best: about what the others alone leave, it has taken up part of what
+    the member does. Intervals, which fit almost anything, are sought beside others only, or in the place of
+    such. What else a lying sensor may do is tried whatever it promises: to first order it says little.
+    """
+    left = search.problem.simulated(*without(fit, member), iterations=0)
+    if left is None:  # without the member, its others run away
+        return []
+    only_laws = not rest and not search.in_intervals(member)
+    screened, intervals = search.screened(left, fit, only_laws=only_laws)
+    gains = screened.singles()
+    least = -tuned.EXCHANGE_PROMISES * reach
+    tried: Counter[str] = Counter()
+    tasks: list[Task] = []
+    for index, amplitude in screened.best_of(lambda c: c is not member, len(gains)):
+        candidate = screened.variants[index].candidate
+        tried[candidate.effect] += 1
+        good = gains[index] >= least and tried[candidate.effect] <= tuned.OTHER_SPOTS
+        if (good and len(tasks) < tuned.EFFECTS_EXCHANGED) or _of_one_sensor(candidate, member):
+            tasks.append(search.task(left, [(screened.variants[index], amplitude)], intervals))
+    return tasks
+
+
+def _of_one_sensor(candidate: Candidate, member: Candidate) -> bool:
+    return candidate.kind == member.kind == SENSOR and candidate.component == member.component
+
+
+def _of_neighbours(search: Search, fit: Fit, member: Candidate, rest: tuple[Candidate, ...]) -> list[Task]:
+    """Fits of a network, which are quick, with what may act near one member of a set in its place.
+
+    Screened about what the others alone leave, as a search has done before. Unrecorded heat in intervals fits
+    almost anything: it is tried at other spots, and beside others any law is tried in its place. Where it
+    follows a recorded quantity it is tried at other spots too; and the other forms of one law, which hardly
+    differ to first order.
+    """
+    own = {effect.name for effect in search.interval_effects}
+    tasks: list[Task] = []
+    if search.in_intervals(member):
+        tasks += at_other_spots(search, fit, member, rest)
+        tasks += _with_laws(search, rest, lambda c: bool(rest) or c.effect in own)
+    else:
+        if member.effect in own:
+            tasks += _with_laws(search, rest, lambda c: c.effect in own and c.component != member.component)
+        tasks += _with_laws(
+            search,
+            rest,
+            lambda c: (c.effect, c.component) == (member.effect, member.component) and c.form != member.form,
+        )
+        places = _beside(search, member.component)
+        tasks += _with_laws(search, rest, lambda c: c.component in places and c.effect != member.effect)
+    return tasks
 
 
 def _as_late(search: Search, fit: Fit, member: Candidate, rest: tuple[Candidate, ...]) -> list[Task]:
@@ -137,7 +155,6 @@ def _with_laws(
     search: Search,
     rest: tuple[Candidate, ...],
     allowed: Callable[[Candidate], bool],
-    number: int = tuned.EFFECTS_EXCHANGED,
 ) -> list[Task]:
     """Fits with the best of the candidates allowed, no intervals among them, beside a set."""
     base = search.found.get(identity(rest))
@@ -146,7 +163,7 @@ def _with_laws(
     if identity(rest) not in search.screenings:
         search.screened(base.fit, only_laws=True)
     screened = search.screenings[identity(rest)]
-    found = screened.best_of(lambda c: allowed(c) and not search.in_intervals(c), number)
+    found = screened.best_of(lambda c: allowed(c) and not search.in_intervals(c), tuned.EFFECTS_EXCHANGED)
     gains, least = screened.singles(), -np.inf
     if search.is_explained(base):
         # What is still to be found is small, and first order says how much it gains.
@@ -163,22 +180,16 @@ def at_other_spots(
     fit: Fit,
     member: Candidate,
     rest: tuple[Candidate, ...],
-    of_each: int = tuned.OTHER_SPOTS,
 ) -> list[Task]:
-    """Fits with intervals at other spots, sought in what a set without one member leaves as it is.
-
-    At most ``of_each`` of heat and of loss, and ``tuned.OTHER_SPOTS`` in all.
-    """
-    kept = {name: value for name, value in fit.values.items() if name not in member.parameters}
-    left = search.problem.simulated(rest, kept, iterations=0)
+    """Fits with intervals at other spots, sought in what a set without one member leaves as it is."""
+    left = search.problem.simulated(*without(fit, member), iterations=0)
     tasks: list[Task] = []
     if left is None:  # without the member, its others run away
         return tasks
     for found, candidate in search.interval_candidates(left):
         if len(tasks) == tuned.OTHER_SPOTS:
             break
-        alike = sum(members[-1].effect == candidate.effect for members, _ in tasks)
-        if alike < of_each and identity((*rest, candidate)) not in search.found:
+        if identity((*rest, candidate)) not in search.found:
             tasks.append(search.task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): found}))
     return tasks
 
@@ -214,12 +225,9 @@ def _other_intervals(search: Search, fit: Fit, event: Candidate) -> tuple[Fit, O
 
 
 def _beside(search: Search, component: str) -> set[str]:
-    """A component, the sets it belongs to, and in a network a node's links and a link's nodes."""
-    found = {component, *_groups_of(search, component)}
-    if search.view.kind == "network":
-        nodes = set(component.split("|"))
-        found |= {c.component for c in search.candidates if nodes & set(c.component.split("|"))}
-    return found
+    """A component of a network, a node's links and a link's nodes."""
+    nodes = set(component.split("|"))
+    return {component, *(c.component for c in search.candidates if nodes & set(c.component.split("|")))}
 
 
 def _groups_of(search: Search, component: str) -> list[str]:

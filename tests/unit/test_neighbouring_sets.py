@@ -10,6 +10,7 @@ import pytest
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.errors import ConvergenceError
+from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant
 from spindle_fem.inference.hypothesis import identity
 from spindle_fem.inference.hypothesis_fit import Problem
@@ -32,14 +33,21 @@ LYING, OTHER_LIE = law("lag", "room", kind="sensor"), law("lag", "flange", kind=
 
 
 class NotingSearch:
-    """The best set is the first of the candidates; every law explains as much to first order."""
+    """The best set is the first of the candidates; every law explains as much to first order.
+
+    About the best set without it they promise ``gains``, in order.
+    """
 
     interval_effects = ()
     effects = dict.fromkeys(("drift", "radiation", "lag"), SimpleNamespace(delays=False))
-    view = SimpleNamespace(kind="machine", groups=(), sets={})
+    view = SimpleNamespace(groups=(), sets={})
 
-    def __init__(self, candidates=(HUMP, RAMP, BESIDE, ELSEWHERE)) -> None:
-        self.candidates = candidates
+    def __init__(self, candidates=(HUMP, RAMP, BESIDE, ELSEWHERE), gains=None) -> None:
+        self.candidates, self.gains = candidates, gains
+        self.problem = SimpleNamespace(
+            predictor=SimpleNamespace(is_network=gains is None),
+            simulated=lambda rest, values, iterations: SimpleNamespace(candidates=rest, values=values),
+        )
         nothing = SimpleNamespace(fit=SimpleNamespace(candidates=(), values={}))
         self.best = SimpleNamespace(fit=SimpleNamespace(candidates=candidates[:1], values={}))
         self.found = {identity(()): nothing, identity(candidates[:1]): self.best}
@@ -68,6 +76,18 @@ class NotingSearch:
         """Laws alone."""
         return False
 
+    def screened(self, fit, trust, only_laws):
+        """What everything promises."""
+        assert trust is self.best.fit
+        assert only_laws
+        order = np.argsort(self.gains)[::-1]
+        found = SimpleNamespace(
+            variants=[Variant(item, {}) for item in self.candidates],
+            singles=lambda: np.array(self.gains),
+            best_of=lambda allowed, number: [(i, 1.0) for i in order if allowed(self.candidates[i])],
+        )
+        return found, {}
+
     def task(self, fit, additions, intervals):
         """The set that would be fitted."""
         return (*fit.candidates, *(variant.candidate for variant, _ in additions)), {}
@@ -77,20 +97,36 @@ class NotingSearch:
         self.asked |= {identity(candidates) for candidates, _ in tasks}
 
 
-def test_other_forms_and_laws_at_its_place_are_tried_in_the_place_of_a_law():
+def test_other_forms_and_laws_at_its_place_are_tried_in_the_place_of_a_law_of_a_network():
     search = NotingSearch()
     exchanged(search)
     assert search.asked == {identity((RAMP,)), identity((BESIDE,))}
 
 
-@pytest.mark.parametrize(
-    ("kind", "tried"), [("machine", (HUMP, BESIDE, ELSEWHERE)), ("network", (HUMP, BESIDE))]
-)
-def test_physics_anywhere_is_tried_in_the_place_of_a_sensor_that_lies(kind, tried):
+def test_laws_at_its_place_are_tried_in_the_place_of_a_sensor_of_a_network_that_lies():
     search = NotingSearch((LYING, OTHER_LIE, HUMP, BESIDE, ELSEWHERE))
-    search.view = SimpleNamespace(kind=kind, groups=(), sets={})
     exchanged(search)
-    assert search.asked == {identity((candidate,)) for candidate in tried}
+    assert search.asked == {identity((HUMP,)), identity((BESIDE,))}
+
+
+def test_what_promises_to_do_the_same_is_tried_in_the_place_of_a_member_wherever_it_acts():
+    least = -tuned.EXCHANGE_PROMISES * tuned.HOPELESS_SCORE
+    search = NotingSearch((HUMP, RAMP, BESIDE, ELSEWHERE), (0.0, least - 1.0, least - 1.0, least + 1.0))
+    exchanged(search)
+    assert search.asked == {identity((ELSEWHERE,))}
+
+
+def test_all_that_a_sensor_may_do_and_a_few_others_are_tried_in_the_place_of_its_lie():
+    """Of one law no more places than that, of all laws no more than that many."""
+    laws = [law(f"law {number}", "room") for number in range(tuned.EFFECTS_EXCHANGED)]
+    places = [law("law 0", f"place {number}") for number in range(tuned.OTHER_SPOTS)]
+    other = law("gain", "room", kind="sensor")
+    candidates = (LYING, *places, *laws, other)
+    search = NotingSearch(candidates, -np.arange(len(candidates), dtype=float))
+    search.effects = dict.fromkeys([c.effect for c in candidates], SimpleNamespace(delays=False))
+    exchanged(search)
+    few = laws[1 : 1 + tuned.EFFECTS_EXCHANGED - tuned.OTHER_SPOTS]
+    assert search.asked == {identity((c,)) for c in (*places, *few, other)}
 
 
 @pytest.fixture
@@ -134,5 +170,5 @@ def test_other_spots_are_not_sought_where_a_set_without_the_member_runs_away(mon
 
     monkeypatch.setattr(Problem, "fit", runs_away)
     search = SimpleNamespace(problem=object.__new__(Problem))
-    fit = SimpleNamespace(values={"heat": 1.0})
+    fit = SimpleNamespace(candidates=(BESIDE, HUMP), values={"heat": 1.0})
     assert at_other_spots(search, fit, BESIDE, (HUMP,)) == []

@@ -68,6 +68,22 @@ def test_heat_in_intervals_is_tried_in_the_place_of_a_law_beside_others(case, he
     assert found.fit.misfit_with_prior < both.fit.misfit_with_prior
 
 
+def test_what_reads_like_a_member_is_tried_in_its_place(case):
+    """Radiation reads like air that carries more away; about nothing missing others promise as much."""
+    sun, air = ("radiation", "housing"), ("natural_convection", "housing")
+    search = search_over(case, case.diagnosis(sun, 0.9, "missing_physics", ()))
+    search.found = {}
+    for candidates, score in (((), -1e4), ((case.candidates[sun],), 0.0)):
+        search.keep(Hypothesis(search.problem.fit(candidates), score))
+    best = search.ranked()[0]
+    exchanged(search)
+    tried = {h.keys: h.fit.misfit_with_prior for h in search.found.values()}
+    assert tried[frozenset({air})] < best.fit.misfit_with_prior + tuned.NEAR_MISFIT
+    # Nothing that promises far less, nor the member once more.
+    assert len(tried) <= 2 + tuned.EFFECTS_EXCHANGED
+    assert frozenset({("heat_split", "rear_bearings")}) not in tried
+
+
 def test_all_that_a_lying_sensor_may_do_is_tried_in_the_place_of_what_was_found(case, heated):
     """Heat in front makes physics near the sensor promise more than what else the sensor may do."""
     search = search_over(case, heated)
