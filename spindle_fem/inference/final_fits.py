@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -38,64 +38,67 @@ def to_be_fitted(
     overlapping: Mapping[str, frozenset[str]],
     coarseness: float,
 ) -> list[Hypothesis]:
-    """The most probable hypotheses, the first of them first, what reads nearly as it, and the empty one."""
-    score = {id(h): value for h, value in zip(found, tempered(found, coarseness), strict=True)}
+    """The most probable hypotheses, the first of them first, and what may turn out to be more so.
+
+    The slow error has changed since the search: whether the first set needs each of its members is tested
+    again, and so is the best set of each smaller size, none at all among them.
+    """
+    score = dict(zip(map(id, found), tempered(found, coarseness), strict=True))
     everything = sorted(found, key=lambda h: -score[id(h)])
     # Whether anything is missing is a separate question (the p-value): here sets are compared.
     ranked = [h for h in everything if h.keys] or everything
-    best = score[id(ranked[0])]
+    first = ranked[0]
+    least = score[id(first)] - tuned.NEGLIGIBLE_SCORE
     # Links of a network differ by more than spots of a machine do.
     different = few_of_each(ranked) if coarseness == 1.0 else ranked
-    chosen = [
-        item
-        for position, item in enumerate(different[: tuned.REFITTED])
-        if position < tuned.ALWAYS_REFITTED or score[id(item)] > best - tuned.NEGLIGIBLE_SCORE
-    ]
-    # The slow error has changed since the search: test again whether the best set needs each member.
-    members = ranked[0].keys
-    smaller = [h for h in ranked if h.keys < members and len(h.keys) == len(members) - 1]
-    chosen += [h for h in smaller if h not in chosen]
-    for size in range(len(members)):
-        chosen += [h for h in everything if len(h.fit.candidates) == size and h not in chosen][:1]
-    first = ranked[0].fit
-    if coarseness > 1.0 and free_in_time(first):
-        # Laws that leave little of a coarse machine come before what may be on at any time.
-        for size in range(1, len(members) + 1):
-            laws = [h for h in ranked if len(h.keys) == size and not free_in_time(h.fit)]
-            chosen += [h for h in laws[: tuned.LAWS_REFITTED] if h not in chosen]
+    chosen = different[: tuned.ALWAYS_REFITTED]
+    chosen += [h for h in different[: tuned.REFITTED] if score[id(h)] > least]
+    chosen += [h for h in ranked if h.keys < first.keys and len(h.keys) == len(first.keys) - 1]
+    chosen += _first_of_each(everything, range(len(first.keys)))
     if coarseness > 1.0:
-        # What leaves least of a coarse machine is told, though other sets are likelier.
-        for size in range(1, 1 + max(len(h.keys) for h in ranked)):
-            own = [h for h in ranked if len(h.keys) == size]
-            chosen += [h for h in sorted(own, key=lambda h: h.fit.misfit_with_prior)[:1] if h not in chosen]
-    rivals = [
-        h
-        for h in ranked
-        if h not in chosen
-        and may_stand_for(h.fit, first, overlapping)
-        and h.fit.misfit_with_prior < first.misfit_with_prior + tuned.NEAREST_WITHIN * tuned.NEAR_MISFIT
-    ]
+        chosen += _of_a_coarse_machine(ranked)
+    chosen = list({id(h): h for h in chosen}.values())
+    rivals = [h for h in ranked if h not in chosen and may_stand_for(h.fit, first.fit, overlapping)]
+    return [*chosen, *_nearest(problem, first.fit, rivals)]
+
+
+def _first_of_each(ordered: Sequence[Hypothesis], sizes: Iterable[int], number: int = 1) -> list[Hypothesis]:
+    """The first sets of each size in an order."""
+    return [h for size in sizes for h in [h for h in ordered if len(h.keys) == size][:number]]
+
+
+def _of_a_coarse_machine(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """What leaves least, which is told though other sets are likelier; and laws that leave little.
+
+    Those come before what may be on at any time.
+    """
+    chosen = []
+    if free_in_time(ranked[0].fit):
+        laws = [h for h in ranked if not free_in_time(h.fit)]
+        chosen += _first_of_each(laws, range(1, len(ranked[0].keys) + 1), tuned.LAWS_REFITTED)
+    leaving_least = sorted(ranked, key=lambda h: h.fit.misfit_with_prior)
+    return chosen + _first_of_each(leaving_least, range(1, 1 + max(len(h.keys) for h in ranked)))
+
+
+def _nearest(problem: Problem, first: Fit, rivals: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """What reads nearly as the first set does, nearest first."""
+    most = first.misfit_with_prior + tuned.NEAREST_WITHIN * tuned.NEAR_MISFIT
+    close = [h for h in rivals if h.fit.misfit_with_prior < most]
     readings = FollowedReadings(SetProblems(problem, problem))
-    nearest = sorted((readings.apart(first, h.fit), i, h) for i, h in enumerate(rivals))
-    chosen += [
-        h
-        for distance, _, h in nearest[: tuned.NEAREST_REFITTED]
-        if distance < tuned.NEAREST_WITHIN * tuned.NEAR_READINGS
+    nearest = sorted((readings.apart(first, h.fit), i, h) for i, h in enumerate(close))[
+        : tuned.NEAREST_REFITTED
     ]
-    return chosen
+    return [h for distance, _, h in nearest if distance < tuned.NEAREST_WITHIN * tuned.NEAR_READINGS]
 
 
 def fitted_sets(problems: SetProblems, chosen: Sequence[Hypothesis], workers: Workers) -> list[Hypothesis]:
     """Hypotheses fitted on a larger basis, each to its own problem; the first one first."""
     first = chosen[0]
-    # Sets far behind the first need not be fitted to their optimum, but for its parts: they are what is
-    # named where the rest of it is not needed.
+    # Sets far behind the first need not be fitted to their optimum, but for nothing, from which gains count.
     begun = problems.of(first.fit).cost_at(first.fit.candidates, first.fit.values)
     behind = begun + 2.0 * tuned.HOPELESS_SCORE
     orders = [
-        FitOrder(
-            h.fit.candidates, h.fit.values, iterations=12, hopeless=np.inf if h.keys < first.keys else behind
-        )
+        FitOrder(h.fit.candidates, h.fit.values, iterations=12, hopeless=behind if h.keys else np.inf)
         for h in chosen
     ]
     # A set that could be simulated on the search's basis may run away on the whole one, and is dropped then.

@@ -214,3 +214,20 @@ def test_what_leaves_least_of_a_network_is_fitted_to_the_end_though_others_are_l
     found = [hypothesis(misfit=1400.0), hypothesis(PRELOAD, misfit=400.0), *others, least]
     problem = SimpleNamespace(predictor=None, slow=None, belief=None)
     assert (least in to_be_fitted(problem, found, {}, coarseness)) is fitted
+
+
+def test_the_parts_of_the_first_set_and_the_best_of_each_smaller_size_are_fitted_again():
+    first = hypothesis(CHURNING, OFFSET, misfit=300.0)
+    parts = [hypothesis(CHURNING, misfit=1200.0), hypothesis(OFFSET, misfit=1300.0)]
+    single = hypothesis(PRELOAD, misfit=700.0)
+    nothing, hopeless = hypothesis(misfit=1400.0), hypothesis(candidate("windage", "part"), misfit=1000.0)
+    pair = hypothesis(PRELOAD, OFFSET, misfit=400.0)
+    chosen = to_be_fitted(
+        SimpleNamespace(predictor=None, slow=None, belief=None),
+        [nothing, hopeless, pair, single, *parts, first],
+        {},
+        1.0,
+    )
+    assert chosen[0] is first
+    # As many as are always fitted again, whatever they leave.
+    assert {id(h) for h in chosen} == {id(h) for h in (first, pair, single, nothing, *parts)}
