@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -13,21 +12,25 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.followed_readings import FollowedReadings
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
-from spindle_fem.inference.like_sets import free_in_time, may_stand_for
+from spindle_fem.inference.like_sets import are_alike, free_in_time, may_stand_for
 from spindle_fem.inference.other_answers import with_other_answers
 from spindle_fem.inference.set_odds import tempered
 from spindle_fem.inference.set_problems import SetProblems, combination_of
 from spindle_fem.inference.worker_processes import FitOrder, Workers, of_candidates
 
 
-def few_of_each(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Sets without more than a few places and forms of one combination of effects, which hide the others."""
-    seen: Counter[tuple[str, ...]] = Counter()
+def few_of_each(ranked: Sequence[Hypothesis], overlapping: Mapping[str, frozenset[str]]) -> list[Hypothesis]:
+    """Sets without more than a few places and forms of one combination of effects, which hide the others.
+
+    Of those fewer still that name the same: bearings of one set hide other places.
+    """
+    of_each: dict[tuple[str, ...], list[Hypothesis]] = {}
     found = []
     for item in ranked:
-        names = combination_of(item.fit)
-        seen[names] += 1
-        if seen[names] <= tuned.REFITTED_OF_EACH:
+        own = of_each.setdefault(combination_of(item.fit), [])
+        alike = sum(are_alike(item.fit, other.fit, overlapping) for other in own)
+        if len(own) < tuned.REFITTED_OF_EACH and alike < tuned.REFITTED_ALIKE:
+            own.append(item)
             found.append(item)
     return found
 
@@ -50,7 +53,7 @@ def to_be_fitted(
     first = ranked[0]
     least = score[id(first)] - tuned.NEGLIGIBLE_SCORE
     # Links of a network differ by more than spots of a machine do.
-    different = few_of_each(ranked) if coarseness == 1.0 else ranked
+    different = few_of_each(ranked, overlapping) if coarseness == 1.0 else ranked
     chosen = different[: tuned.ALWAYS_REFITTED]
     chosen += [h for h in different[: tuned.REFITTED] if score[id(h)] > least]
     chosen += [h for h in ranked if h.keys < first.keys and len(h.keys) == len(first.keys) - 1]

@@ -167,9 +167,9 @@ HOPELESS = 60.0
 # Hypotheses that are fitted again on the larger basis: at most, at least, and how much less likely than the
 # best they may be beyond the least number.
 REFITTED, ALWAYS_REFITTED, NEGLIGIBLE_SCORE = 8, 2, 8.0
-# Places and forms of one combination of effects among them, and sets of each size that follow laws alone,
-# where the first of a network does not.
-REFITTED_OF_EACH, LAWS_REFITTED = 3, 3
+# Places and forms of one combination of effects among them, those that name the same, and sets of each size
+# that follow laws alone, where the first of a network does not.
+REFITTED_OF_EACH, REFITTED_ALIKE, LAWS_REFITTED = 3, 2, 3
 # Other sets whose readings are nearest the best set's are fitted again as well: their number, and how many
 # times the limits NEAR_READINGS and NEAR_MISFIT below they may differ, as the larger basis may move them.
 NEAREST_REFITTED, NEAREST_WITHIN = 3, 1.3

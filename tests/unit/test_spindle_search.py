@@ -134,15 +134,16 @@ def test_a_channel_that_is_early_is_not_tried_as_a_slow_sensor(case, heated):
     assert neighbouring_sets._as_late(search, early, clock, ()) == []
 
 
-def test_places_of_one_combination_hide_no_other():
+def test_places_of_one_combination_hide_no_other_nor_bearings_of_a_set_another_place():
     def at(effect, place):
-        return SimpleNamespace(
-            fit=SimpleNamespace(candidates=(SimpleNamespace(effect=effect, component=place),))
-        )
+        own = SimpleNamespace(effect=effect, component=place)
+        return SimpleNamespace(fit=SimpleNamespace(candidates=(own,), named=(own,)))
 
     ranked = [at("seal_friction", place) for place in "abcd"] + [at("windage", "shaft")]
-    kept = few_of_each(ranked)
+    kept = few_of_each(ranked, {})
     assert kept == [*ranked[: tuned.REFITTED_OF_EACH], ranked[-1]]
+    kept = few_of_each(ranked, {place: frozenset("abc") for place in "abc"})
+    assert kept == [*ranked[: tuned.REFITTED_ALIKE], *ranked[-2:]]
 
 
 def test_intervals_are_sought_again_where_they_are_others(case, heated):
