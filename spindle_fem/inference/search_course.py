@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hidden_states import without
 from spindle_fem.inference.hypothesis import Hypothesis, identity
@@ -92,8 +93,12 @@ def _far_off(search: Search, fit: Fit) -> list[Task]:
     To first order what it has of the error is as good as the effect, so that a screening does not show it.
     An effect that lowered nothing beside nothing missing is not tried again beside others.
     """
-    values = fit.values
-    nothing = search.found[identity(())].fit.misfit_with_prior
+    values, nothing = fit.values, search.found[identity(())].fit.misfit_with_prior
+
+    def lowers(candidate: Candidate) -> bool:
+        alone = search.found.get(identity((candidate,)))
+        return alone is None or alone.fit.misfit_with_prior < nothing
+
     late = [
         (item, values[item.coordinate])
         for item in search.problem.predictor.misdescribed
@@ -103,9 +108,7 @@ def _far_off(search: Search, fit: Fit) -> list[Task]:
         ((*fit.candidates, candidate), values | {item.coordinate: 0.0, candidate.amplitude: seconds})
         for item, seconds in late
         for candidate in search.delaying(item.delays, seconds)
-        if candidate not in fit.candidates
-        if (alone := search.found.get(identity((candidate,)))) is None
-        or alone.fit.misfit_with_prior < nothing
+        if candidate not in fit.candidates and lowers(candidate)
     ]
 
 

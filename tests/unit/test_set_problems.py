@@ -15,6 +15,7 @@ from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coolant_misdescriptions import StandingCoolant
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX, GAP_PREFIX, JUMP_PREFIX
 from spindle_fem.inference.heat_misdescriptions import SpeedShape
+from spindle_fem.inference.hypothesis import identity
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.misdescription import Misdescription
@@ -184,6 +185,7 @@ def test_a_large_delay_of_a_sensor_is_tried_as_its_effects(case, seconds, tried)
 
     search = SimpleNamespace(problem=problem, candidates=candidates_for(case.view), effects=catalogue())
     search.delaying = partial(Search.delaying, search)
+    search.found = {identity(()): SimpleNamespace(fit=null)}
     tasks = search_course._far_off(search, null)
     assert {members[0].effect for members, _ in tasks} == tried
     for (member,), start in tasks:
@@ -198,3 +200,9 @@ def test_a_large_delay_of_a_sensor_is_tried_as_its_effects(case, seconds, tried)
         found = search_course._far_off(search, fit)
         assert all(members[:-1] == held for members, _ in found)
         assert {members[-1].effect for members, _ in found} == (tried if held == (beside,) else set())
+    # Those that lowered nothing beside nothing missing are not tried again.
+    for members, _ in tasks:
+        search.found[identity(members)] = SimpleNamespace(fit=null)
+    fit = problem.fit((beside,), {late.coordinate: value}, iterations=0)
+    fit.position[[c.name for c in fit.coordinates].index(late.coordinate)] = value / late.sigma
+    assert search_course._far_off(search, fit) == []
