@@ -35,6 +35,7 @@ from spindle_fem.inference.prepared_problem import (
     with_inexact_laws,
     with_own_noise,
 )
+from spindle_fem.inference.recording_clocks import on_clock_of_inputs
 from spindle_fem.inference.search_basis import acted_on, on_smaller_bases, smaller_predictors
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.set_odds import rank
@@ -183,10 +184,8 @@ def diagnose_recordings(
     without = problem.fit()
     if directions:
         # Their columns, about the machine as its recordings show it.
-        predictor = with_misdescriptions(predictor, directions, without.values)
-        small = small.misdescribed_like(predictor)
-        problem = Problem(small, calibrated.known, calibrated.slow, small.observations)
-        without = problem.fit((), without.values)
+        predictor, problem, without = on_clock_of_inputs(predictor, problem, without, directions)
+        small = problem.predictor
     problem = with_inexact_laws(problem, without)
     clock.lap("reduction")
     search = Search(problem, view, effects, candidates, interval_effects(), weights, progress, workers)

@@ -182,7 +182,7 @@ def at_stamps(predictor: Predictor, number: int, on_grid: Array) -> Array:
     """
     recording, grid = predictor.recordings[number], predictor.drives[number].grid
     kelvins = recording.temperature_count
-    predicted = np.array([np.interp(recording.times, grid, column) for column in on_grid.T]).T
+    predicted = np.array([np.interp(predictor.stamps(number), grid, column) for column in on_grid.T]).T
     apart = np.where(recording.usable, recording.temperature - predicted, np.nan)[:, kelvins:]
     predicted[:, kelvins:] += [np.nanmean(own) if np.isfinite(own).any() else 0.0 for own in apart.T]
     return predicted

@@ -12,7 +12,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.filters import delayed, first_order_lag
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
-from spindle_fem.inference.misdescription import Change, Misdescription
+from spindle_fem.inference.misdescription import EVERY_CHANNEL, Change, Misdescription
 from spindle_fem.inference.predictor import Predictor
 
 Array = NDArray[np.float64]
@@ -208,6 +208,7 @@ def heat_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
             clock_change,
             number,
             of_sensor=True,
+            delays=EVERY_CHANNEL,
         )
 
 

@@ -165,7 +165,7 @@ class Search:
         recording = predictor.recordings[0]
         predicted = predictor.predict(0, fit.values, fit.candidates).temperature
         grid = predictor.drives[0].grid
-        at_stamps = np.column_stack([np.interp(recording.times, grid, column) for column in predicted.T])
+        at_stamps = np.column_stack([np.interp(predictor.stamps(0), grid, column) for column in predicted.T])
         known = recording.usable & predictor.use[0][:, None]
         return recording.times, np.where(known, recording.temperature - at_stamps, np.nan)
 

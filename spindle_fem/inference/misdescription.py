@@ -7,7 +7,7 @@ physics.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, MISDESCRIBED_PREFIX
 
 Array = NDArray[np.float64]
+
+# What a clock delays.
+EVERY_CHANNEL = "*"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +65,8 @@ class Misdescription:
         Whether it is what is read that differs, not the machine: far off it is an effect of the catalogue,
         no wrong definition.
     delays : str
-        Channel that it makes late, where it does so; by much that is an effect of the catalogue.
+        Channel that it makes late, or ``EVERY_CHANNEL``, where it does so; of a channel, by much that is an
+        effect of the catalogue.
     """
 
     name: str
@@ -81,3 +85,8 @@ class Misdescription:
         if self.recording is None:
             return MISDESCRIBED_PREFIX + self.name
         return f"{MISDESCRIBED_IN_PREFIX}{self.recording}.{self.name}"
+
+
+def delays_in(number: int, directions: Sequence[Misdescription]) -> dict[str, str]:
+    """Of each direction that is a delay in a recording its coordinate, and the channel that it makes late."""
+    return {i.coordinate: i.delays for i in directions if i.delays and i.recording in (None, number)}

@@ -12,7 +12,8 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.calibration import LEVEL
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.hypothesis_fit import Fit
-from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.misdescription import EVERY_CHANNEL, Misdescription
+from spindle_fem.inference.predictor import Predictor
 
 # Directions that are listed: those moved by this many standard deviations of their priors, so many at most.
 MOVED, MOST_LISTED = 0.7, 8
@@ -52,7 +53,8 @@ def _rows(diagnosis: Diagnosis, fit: Fit, directions: Sequence[Misdescription]) 
 def _row(diagnosis: Diagnosis, fit: Fit, item: Misdescription) -> dict[str, Any]:
     """One direction in one fit."""
     predictor = diagnosis.predictor
-    value = fit.values[item.coordinate]
+    late = _late_already(predictor, item)
+    value = fit.values[item.coordinate] + late
     low, high = fit.interval(item.coordinate, float(ndtri(0.5 + 0.5 * LEVEL)) * tuned.INTERVAL_WIDENING)
     largest, channel, swing, sensor = 0.0, "", 0.0, ""
     for number, recording in enumerate(predictor.recordings):
@@ -75,14 +77,19 @@ def _row(diagnosis: Diagnosis, fit: Fit, item: Misdescription) -> dict[str, Any]
         "unit": item.unit,
         "prior_sigma": item.sigma,
         "value": value,
-        "low": low,
-        "high": high,
+        "low": low + late,
+        "high": high + late,
         "sigmas": value / item.sigma,
         "largest_K": largest,
         "channel": channel or sensor,
         **({"largest_um": swing} if sensor else {}),
         **({"recording": predictor.recordings[item.recording].name} if several else {}),
     }
+
+
+def _late_already(predictor: Predictor, item: Misdescription) -> float:
+    """By how much the clock of a recording was found to be off before the fit, s."""
+    return float(predictor.late[item.recording]) if item.delays == EVERY_CHANNEL else 0.0
 
 
 def _to_measure(
@@ -96,7 +103,8 @@ def _to_measure(
     best, most = None, 1.0
     for item in directions:
         row = names.index(item.coordinate)
-        widths = abs(fit.position[row]) / np.sqrt(fit.covariance[row, row])
+        late = _late_already(diagnosis.predictor, item) / item.sigma
+        widths = abs(fit.position[row] + late) / np.sqrt(fit.covariance[row, row])
         if widths > most:
             best, most = item, float(widths)
     if best is None:

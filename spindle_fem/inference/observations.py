@@ -54,6 +54,7 @@ def observe(
     grids: Sequence[Array | None],
     widths: Sequence[float | None],
     rows: Sequence[float] | None = None,
+    stamps: Sequence[Array] | None = None,
 ) -> tuple[Observation, ...]:
     """Observations of every channel that has usable readings.
 
@@ -68,13 +69,16 @@ def observe(
     rows : sequence of float, optional, [s]
         Time over which each row of a recording is a mean: predictions are averaged as the readings were.
         Otherwise rows are of their moment.
+    stamps : sequence of (N,) ndarray, optional, [s]
+        Stamps of the readings on the grid's clock, where that is another one than theirs.
     """
     found = []
     for number, (recording, mask, grid, width) in enumerate(zip(recordings, use, grids, widths, strict=True)):
         for bins in channel_bins(recording, mask, width=width):
             values = bins.average(recording.temperature[:, bins.channel])
             row = 0.0 if rows is None else rows[number]
-            means = None if grid is None else _means(bins, recording.times, grid, row)
+            times = recording.times if stamps is None else stamps[number]
+            means = None if grid is None else _means(bins, times, grid, row)
             found.append(Observation(number, bins.channel, bins, values, means))
     return tuple(found)
 

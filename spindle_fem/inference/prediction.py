@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, Reading
 from spindle_fem.effects.registry import effect_of
-from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
+from spindle_fem.inference.coordinate_names import DIRECTIONS, EFFECT_PREFIX, PROBE_PREFIX
 from spindle_fem.model.reduced.drive import Drive, inputs_at
 from spindle_fem.model.reduced.reduced_transient import TransientRun
+from spindle_fem.model.thermal_model import ThermalModel
 
 Array = NDArray[np.float64]
 
@@ -74,6 +75,25 @@ class Prediction:
             self.temperature[:] += change.reshape(self.temperature.shape)
             asked = [index for index, name in enumerate(names) if name in derivatives]
             self.sensitivity[:, :, [derivatives.index(names[i]) for i in asked]] += slopes[:, :, asked]
+
+    def displace(
+        self,
+        model: ThermalModel,
+        probes: Sequence[str],
+        values: Mapping[str, float],
+        derivatives: Sequence[str],
+    ) -> None:
+        """Read each probe where it sits, to first order in its displacement, in place."""
+        for name in {name for name in (*values, *derivatives) if name.startswith(PROBE_PREFIX)}:
+            probe, _, direction = name.removeprefix(PROBE_PREFIX).rpartition(".")
+            if probe not in probes:
+                continue
+            gradient = model.probe_gradients[model.probe_names.index(probe), DIRECTIONS.index(direction)]
+            slope = self.states @ gradient
+            column = probes.index(probe)
+            self.temperature[:, column] += values.get(name, 0.0) * slope
+            if name in derivatives:
+                self.sensitivity[:, column, derivatives.index(name)] += slope
 
     def read(
         self,

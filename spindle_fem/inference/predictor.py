@@ -112,6 +112,7 @@ class Predictor:
         self._columns: dict[tuple[int, str], Array] = {}
         self._stacked: dict[int, tuple[list[str], Array]] = {}
         self.columns = [fast.require_channels(item.probes, item.source) for item in recordings]
+        self.late = np.zeros(len(self.recordings))
         self.observations = self._observe(self.use)
         self.heldout = self._observe([~mask for mask in self.use])
 
@@ -135,7 +136,20 @@ class Predictor:
         grids = [None if self.at_stamps else drive.grid for drive in self.drives]
         thinned = [item.defects.thinned for item in self.recordings]
         rows = [0.0 if item is None else item.step_s for item in thinned] if coarse else None
-        return observe(self.recordings, masks, grids, widths, rows)
+        stamps = [self.stamps(number) for number in range(len(self.recordings))]
+        return observe(self.recordings, masks, grids, widths, rows, stamps)
+
+    def stamps(self, number: int) -> Array:
+        """Stamps of the readings of a recording on the clock of its inputs, (N,) s."""
+        return self.recordings[number].times - self.late[number]
+
+    def on_clocks(self, late: Array) -> Predictor:
+        """The predictor with temperatures stamped so much later than inputs, for each recording, s."""
+        found = copy.copy(self)
+        found.late = late
+        found.observations = found._observe(found.use)
+        found.heldout = found._observe([~mask for mask in found.use])
+        return found
 
     def with_model(self, fast: FastModel, same_within: float = 0.0) -> Predictor:
         """The predictor with another reduction of the same machine."""
@@ -148,7 +162,7 @@ class Predictor:
             drives=self.drives,
             same_within=same_within,
         )
-        return found.misdescribed_like(self).with_unseen(self.unseen)
+        return found.misdescribed_like(self).with_unseen(self.unseen).on_clocks(self.late)
 
     def with_unseen(self, power: Sequence[Array]) -> Predictor:
         """The predictor with the uncertainty of rarely read inputs of each recording.
@@ -390,7 +404,7 @@ class Predictor:
         if found.inlet_by is not None:
             inlet[1][:, inside] = found.inlet_by[:, owners[inside]]
         predicted = Prediction(temperature, sensitivity, found.states, run, found.tangents, owners, *inlet)
-        self._displace(number, predicted, values, derivatives)
+        predicted.displace(self.fast.model, self.recordings[number].probes, values, derivatives)
         self._unseen(number, predicted, values, derivatives)
         return predicted
 
@@ -417,22 +431,6 @@ class Predictor:
                 if reading.before_sensor is not of_sensor:
                     predicted.read(reading, names, drive, *told)
         return felt
-
-    def _displace(
-        self, number: int, predicted: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
-    ) -> None:
-        """Read each probe where it sits, to first order in its displacement, in place."""
-        model, probes = self.fast.model, self.recordings[number].probes
-        for name in {name for name in (*values, *derivatives) if name.startswith(PROBE_PREFIX)}:
-            probe, _, direction = name.removeprefix(PROBE_PREFIX).rpartition(".")
-            if probe not in probes:
-                continue
-            gradient = model.probe_gradients[model.probe_names.index(probe), DIRECTIONS.index(direction)]
-            slope = predicted.states @ gradient
-            column = probes.index(probe)
-            predicted.temperature[:, column] += values.get(name, 0.0) * slope
-            if name in derivatives:
-                predicted.sensitivity[:, column, derivatives.index(name)] += slope
 
     def _unseen(
         self, number: int, predicted: Prediction, values: Mapping[str, float], derivatives: Sequence[str]

@@ -21,6 +21,7 @@ from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import ChannelBins, SlowError, likely_slow_error, slow_errors_of
+from spindle_fem.inference.recording_clocks import restamped
 from spindle_fem.inference.robust_size import huber
 
 Array = NDArray[np.float64]
@@ -260,14 +261,15 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
     if earlier is None:
         belief = known_before(predictor)
         return Calibrated(belief, belief, expected_slow_error(predictor), None)
-    slow, fit = expected_slow_error(earlier), None
+    slow, fit, begin = expected_slow_error(earlier), None, None
     prior = known_before(earlier)
     for _ in range(CALIBRATION_ROUNDS):
         if fit is not None:
             # Directions are linearised about the fitted numbers.
-            earlier = with_misdescriptions(earlier, earlier.misdescribed, fit.values)
+            earlier, begin = restamped(earlier, fit)
+            earlier = with_misdescriptions(earlier, earlier.misdescribed, begin)
         problem, before = Problem(earlier, prior, slow, earlier.observations), fit
-        fit = problem.fit((), None if fit is None else fit.values)
+        fit = problem.fit((), begin)
         slow = slow_error_of(problem, fit)
         if before is not None and np.abs(fit.position - before.position).max(initial=0.0) < SETTLED:
             break
