@@ -169,7 +169,7 @@ HOPELESS = 60.0
 REFITTED, ALWAYS_REFITTED, NEGLIGIBLE_SCORE = 8, 2, 8.0
 # Places and forms of one combination of effects among them, those that name the same, and sets of each size
 # that follow laws alone, where the first of a network does not.
-REFITTED_OF_EACH, REFITTED_ALIKE, LAWS_REFITTED = 3, 2, 3
+REFITTED_OF_EACH, REFITTED_ALIKE, LAWS_REFITTED = 4, 3, 3
 # Other sets whose readings are nearest the best set's are fitted again as well: their number, and how many
 # times the limits NEAR_READINGS and NEAR_MISFIT below they may differ, as the larger basis may move them.
 NEAREST_REFITTED, NEAREST_WITHIN = 3, 1.3
