@@ -139,11 +139,15 @@ def test_places_of_one_combination_hide_no_other_nor_bearings_of_a_set_another_p
         own = SimpleNamespace(effect=effect, component=place)
         return SimpleNamespace(fit=SimpleNamespace(candidates=(own,), named=(own,)))
 
-    ranked = [at("seal_friction", place) for place in "abcd"] + [at("windage", "shaft")]
-    kept = few_of_each(ranked, {})
-    assert kept == [*ranked[: tuned.REFITTED_OF_EACH], ranked[-1]]
-    kept = few_of_each(ranked, {place: frozenset("abc") for place in "abc"})
-    assert kept == [*ranked[: tuned.REFITTED_ALIKE], *ranked[-2:]]
+    few, alike = tuned.REFITTED_OF_EACH, tuned.REFITTED_ALIKE
+    assert alike < few
+    places = [f"place {number}" for number in range(few + 2)]
+    ranked = [at("seal_friction", place) for place in places] + [at("windage", "shaft")]
+    assert few_of_each(ranked, {}) == [*ranked[:few], ranked[-1]]
+    # Of the first ones, which count as one place, one too many gives way to the next place.
+    one = frozenset(places[: alike + 1])
+    kept = few_of_each(ranked, dict.fromkeys(one, one))
+    assert kept == [*ranked[:alike], *ranked[alike + 1 : few + 1], ranked[-1]]
 
 
 def test_intervals_are_sought_again_where_they_are_others(case, heated):
