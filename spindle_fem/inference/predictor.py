@@ -98,7 +98,7 @@ class Predictor:
         self._initial = [
             fast.inputs.initial_parameters(item) if self.is_network else () for item in self._felt
         ]
-        self._jumps = [unseen_jumps(item, drive) if left_open else () for item, drive in pairs]
+        self.unread_jumps = [unseen_jumps(item, drive) if left_open else () for item, drive in pairs]
         self._gaps = [() if at_stamps else gap_pieces(item) for item in self.recordings]
         self._hidden = [
             hidden_in(recording, gaps, [group.name for group in fast.spec.bearing_set]) if left_open else ()
@@ -223,7 +223,7 @@ class Predictor:
         """Changes of inputs that fell into gaps: name; least and most that they were earlier [s]."""
         return [
             (f"{JUMP_PREFIX}{number}.{index}", least, most)
-            for number, items in enumerate(self._jumps)
+            for number, items in enumerate(self.unread_jumps)
             for index, (_, least, most) in enumerate(items)
         ]
 
@@ -250,7 +250,7 @@ class Predictor:
             Change of the channels by the value [K], and with each unit more.
         """
         grid = self.drives[number].grid
-        moments = {JUMP_PREFIX: [float(grid[step]) for step, _, _ in self._jumps[number]]}
+        moments = {JUMP_PREFIX: [float(grid[step]) for step, _, _ in self.unread_jumps[number]]}
         moments[GAP_PREFIX] = [0.5 * (item.begin + item.end) for item in self._hidden[number]]
         return {
             name: self._opened(kind, number, index, values.get(name, 0.0))
@@ -436,7 +436,7 @@ class Predictor:
         self, number: int, predicted: Prediction, values: Mapping[str, float], derivatives: Sequence[str]
     ) -> None:
         """Add first-order changes by what gaps and rows leave open, in place."""
-        for kind, open_ones in ((JUMP_PREFIX, self._jumps[number]), (GAP_PREFIX, self._hidden[number])):
+        for kind, open_ones in ((JUMP_PREFIX, self.unread_jumps[number]), (GAP_PREFIX, self._hidden[number])):
             names = [f"{kind}{number}.{index}" for index in range(len(open_ones))]
             if any(name in values or name in derivatives for name in names):
                 slopes, at = self._columns_of(kind, number), values
@@ -461,7 +461,7 @@ class Predictor:
         """Change of the channels (G + 1, c) [K] by what gaps and rows leave open, and with each unit more."""
         columns = self._columns_of(kind, number)
         if kind == JUMP_PREFIX:
-            most = np.array([self._jumps[number][index][2]])
+            most = np.array([self.unread_jumps[number][index][2]])
             return tuple(columns[:, :, index] @ own[0] for own in weights_of_earlier(most, np.array([value])))
         return value * columns[:, :, index], columns[:, :, index]
 
@@ -472,12 +472,12 @@ class Predictor:
             run = self.transient(number, values, candidates)
             states, tracks = run.march(self.start(number, values))
             if kind == JUMP_PREFIX:
-                forcing = jump_forcing(run, states, self._jumps[number])
+                forcing = jump_forcing(run, states, self.unread_jumps[number])
             else:
                 forcing = hidden_forcing(run, self.fast, self._hidden[number])
             found = channel_changes(run, tracks, forcing, self.columns[number])
             if kind == JUMP_PREFIX:
-                found = found.reshape(*found.shape[:2], len(self._jumps[number]), -1)
+                found = found.reshape(*found.shape[:2], len(self.unread_jumps[number]), -1)
             self._unread[kind, number] = found
         return self._unread[kind, number]
 

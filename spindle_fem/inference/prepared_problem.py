@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import THETA_BOUND, Belief, Coordinate
 from spindle_fem.inference.calibration import coordinate_of
-from spindle_fem.inference.coordinate_names import DIRECTIONS, PROBE_PREFIX
+from spindle_fem.inference.coordinate_names import DIRECTIONS, JUMP_PREFIX, PROBE_PREFIX
 from spindle_fem.inference.earlier_readings import EarlierReadings
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
@@ -22,6 +22,7 @@ from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import ChannelBins, SlowError, likely_slow_error, slow_errors_of
 from spindle_fem.inference.recording_clocks import restamped
+from spindle_fem.inference.recording_gaps import about_rows_amid
 from spindle_fem.inference.robust_size import huber
 
 Array = NDArray[np.float64]
@@ -102,20 +103,33 @@ def start_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:
 
 
 def known_before(predictor: Predictor) -> Belief:
-    """Belief before any recording: each coordinate for itself, but for what radial places of probes share."""
+    """Belief before any recording: each coordinate for itself but for two kinds that share a part.
+
+    Those are radial places of probes, and when inputs changed beside rows that lie amid a change.
+    """
     belief = Belief.prior((*machine_coordinates(predictor), *start_coordinates(predictor)))
+    place = {c.name: index for index, c in enumerate(belief.coordinates)}
     owner = {} if predictor.is_network else {probe.name: probe.part for probe in predictor.fast.spec.probe}
     of_part: dict[str, list[int]] = {}
-    for index, coordinate in enumerate(belief.coordinates):
-        if coordinate.name.startswith(PROBE_PREFIX) and coordinate.name.endswith(RADIAL):
-            probe = coordinate.name.removeprefix(PROBE_PREFIX).removesuffix(RADIAL)
+    for name, index in place.items():
+        if name.startswith(PROBE_PREFIX) and name.endswith(RADIAL):
+            probe = name.removeprefix(PROBE_PREFIX).removesuffix(RADIAL)
             of_part.setdefault(owner[probe], []).append(index)
-    shared = (tuned.COMMON_RADIAL_SIGMA / RADIAL_SIGMA) ** 2
     for rows in of_part.values():
-        correlation = np.full((len(rows), len(rows)), shared)
-        np.fill_diagonal(correlation, 1.0)
-        belief.root[np.ix_(rows, rows)] = np.linalg.cholesky(np.linalg.inv(correlation)).T
+        _alike(belief.root, rows, (tuned.COMMON_RADIAL_SIGMA / RADIAL_SIGMA) ** 2)
+    for number, jumps in enumerate(predictor.unread_jumps):
+        recording, drive = predictor.recordings[number], predictor.drives[number]
+        for own in about_rows_amid(recording, drive, jumps):
+            rows = [place[f"{JUMP_PREFIX}{number}.{index}"] for index in own]
+            _alike(belief.root, rows, tuned.SHARED_OF_ROWS)
     return belief
+
+
+def _alike(root: Array, rows: Sequence[int], shared: float) -> None:
+    """Give coordinates, each for itself before, a part in common: ``shared`` of the variance, in place."""
+    correlation = np.full((len(rows), len(rows)), shared)
+    np.fill_diagonal(correlation, 1.0)
+    root[np.ix_(rows, rows)] = np.linalg.cholesky(np.linalg.inv(correlation)).T
 
 
 def expected_slow_error(predictor: Predictor) -> SlowError:

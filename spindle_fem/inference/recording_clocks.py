@@ -36,8 +36,9 @@ def restamped(predictor: Predictor, fit: Fit) -> tuple[Predictor, dict[str, floa
         clock = next((name for name, late in delays.items() if late == EVERY_CHANNEL), None)
         if clock is not None:
             of_channels = [fit.values.get(name, 0.0) for name in delays if name != clock]
-            seconds[number] = values[clock] + float(np.median([*of_channels, 0.0]))
-            values[clock] = 0.0
+            common = float(np.median([*of_channels, 0.0]))
+            # Channels keep what they are late by themselves.
+            seconds[number], values[clock] = values[clock] + common, -common
     if fit.reduced_misfit > tuned.DISTORTED**2 or np.abs(seconds).max(initial=0.0) < LEAST_LATE:
         return predictor, dict(fit.values)
     return predictor.on_clocks(predictor.late + seconds), values

@@ -192,6 +192,31 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
     return tuple(sorted(item for _, item in chosen))
 
 
+def about_rows_amid(
+    recording: Recording, drive: Drive, jumps: Sequence[tuple[int, float, float]]
+) -> tuple[list[int], list[int]]:
+    """Which changes lead to a row whose inputs lie between those of the rows beside it, and which from it.
+
+    Such a row shows how a logger makes its rows, as means over some time or in passing, and does so for all.
+
+    Parameters
+    ----------
+    jumps : sequence of (int, float, float)
+        As :func:`unseen_jumps` gives them.
+    """
+    usual = float(np.median(np.diff(recording.times)))
+    to_it, from_it = [], []
+    for index, ((first, *_), (second, *_)) in enumerate(itertools.pairwise(jumps)):
+        changes = [drive.start[step] - drive.end[step - 1] for step in (first, second)]
+        apart = float(drive.grid[second] - drive.grid[first])
+        if apart <= GAP_STEPS * usual and np.any(changes[0] * changes[1] > 0.0):
+            to_it.append(index)
+            from_it.append(index + 1)
+    # Of a change over several rows none lies between two that stay.
+    ramps = {*to_it} & {*from_it}
+    return [i for i in to_it if not {i, i + 1} & ramps], [i for i in from_it if not {i, i - 1} & ramps]
+
+
 def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, float, float]]) -> Array:
     """Change of the states of a run where an input changed earlier than it is drawn, (G, r, n * TIMES) K.
 

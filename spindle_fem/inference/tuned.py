@@ -40,6 +40,10 @@ GAP_PIECE, MOST_PIECES = 150.0, 8
 # A held input that is another in a row changed at any time since the row before it. Rows nearer than this [s]
 # leave nothing open that readings show, and of many changes the largest are left open.
 LEAST_SPACING, MOST_JUMPS, MOST_BETWEEN = 15.0, 60, 20
+# When inputs changed beside a row that lies between its neighbours follows from how a logger makes its rows:
+# share of the variance that all such changes of a recording have in common. (Those fitted of a recording with
+# rows of two minutes differ by 6 s, one standard deviation, where 60 s are open.)
+SHARED_OF_ROWS = 0.9
 # Deviations of a machine with geometry from its definition. A table of heat over speed: one standard
 # deviation as a share, and the share of the speed range over which it is correlated. Share by which balls
 # conduct better at the highest speed. Clocks of inputs and temperatures, s: two loggers set by hand.

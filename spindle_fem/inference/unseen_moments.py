@@ -51,9 +51,11 @@ def unseen_moments(predictor: Predictor, fit: Fit) -> dict[str, float]:
 def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
     """What inputs did between the rows of held-out stretches, from all readings: values by name.
 
-    Within the bounds of what rows leave open; all else as it was fitted.
+    Within the bounds of what rows leave open, as far from what was fitted as that is uncertain; all else as
+    it was fitted.
     """
     known = {c.name: c for c in fit.coordinates}
+    deviation = dict(zip(known, np.sqrt(np.diag(fit.covariance)), strict=True))
     found: dict[str, float] = {}
     for number, recording in enumerate(predictor.recordings):
         held = stretches(~predictor.use[number], recording.times)
@@ -70,6 +72,8 @@ def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
             if item.recording == number and not item.bins.is_relative
         ]
         coordinates = [known[name] for name in values]
+        fitted = np.array([c.of(v) for c, v in zip(coordinates, values.values(), strict=True)])
+        known_to = np.array([deviation[name] for name in values])
         without = predicted - sum(c for c, _ in _opened(predictor, number, held, values))
         for _ in range(ROUNDS):
             changes, slopes = zip(*_opened(predictor, number, held, values), strict=True)
@@ -82,8 +86,8 @@ def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
             ]
             matrix = np.vstack(own)
             moved = lsq_linear(
-                np.vstack((matrix, np.eye(len(now)))),
-                np.concatenate((np.concatenate(rest) + matrix @ now, np.zeros(len(now)))),
+                np.vstack((matrix, np.diag(1.0 / known_to))),
+                np.concatenate((np.concatenate(rest) + matrix @ now, fitted / known_to)),
                 ([c.low for c in coordinates], [c.high for c in coordinates]),
             ).x
             values = {c.name: c.at(u) for c, u in zip(coordinates, moved, strict=True)}
