@@ -125,7 +125,12 @@ class Search:
         self.fit_all(tasks)
 
     def screened(
-        self, fit: Fit, trust: Fit | None = None, *, only_laws: bool = False
+        self,
+        fit: Fit,
+        trust: Fit | None = None,
+        *,
+        only_laws: bool = False,
+        beside: Sequence[Variant] = (),
     ) -> tuple[Screened, dict[int, OnOff]]:
         """Candidates, and intervals at every spot, against what a fit leaves.
 
@@ -135,6 +140,8 @@ class Search:
             The fit that gains count from where that is another one.
         only_laws : bool
             Whether to leave intervals out, which take most of the time.
+        beside : sequence of Variant
+            Screened as well.
         """
         families = self._families()
         present = {(effect, families.get(component, component)) for effect, component in fit.keys}
@@ -152,6 +159,7 @@ class Search:
                 variant = Variant(candidate, {})
                 intervals[id(candidate)] = found
                 variants.append(variant)
+        variants.extend(beside)
         found = screen(
             self.problem, fit, variants, self.weights, families, trust, self.workers, linear=linear
         )
@@ -254,6 +262,26 @@ class Search:
         """Keep what the choice of a candidate's intervals costs, as a logarithm."""
         self._paid[identity((candidate,))] = paid
 
+    def cost_of(self, candidate: Candidate) -> float:
+        """What the choice of a candidate's intervals costs, as a logarithm; 0 of what has none."""
+        return self._paid.get(identity((candidate,)), 0.0)
+
+    def elsewhere(self, member: Candidate, values: Mapping[str, float]) -> list[Variant]:
+        """What is on in intervals at every other spot, in the same ones and with the same lag."""
+        effect = self.effects[member.effect]
+        spans = effect.intervals(member, values)
+        known = {item.name: values[name] for name, item in member.parameters.items() if name in values}
+        found = []
+        for other, pattern in self.patterns():
+            if other.name == member.effect:
+                here = effect.over(self.view, pattern.spot, spans)
+                here = replace(here, reference=member.reference, recording=member.recording)
+                if identity((here,)) != identity((member,)):
+                    self.remember_cost(here, self.cost_of(member))
+                    own = {n: known[p.name] for n, p in here.free.items() if p.name in known}
+                    found.append(Variant(here, {n: v for n, v in own.items() if n != here.amplitude}))
+        return found
+
     def hypothesis(self, fit: Fit, paid: float = 0.0) -> Hypothesis:
         """A fitted set with its prior, and the cost of the courses of its hidden states.
 
@@ -336,7 +364,7 @@ class Search:
                 known = self.found.get(identity(candidates))
                 if known is not None and known.fit.misfit_with_prior <= fitted.misfit_with_prior:
                     continue
-                paid = sum(self._paid.get(identity((c,)), 0.0) for c in candidates)
+                paid = sum(self.cost_of(c) for c in candidates)
                 self.keep(self.hypothesis(fitted, paid))
 
     def _unseen(self, candidate: Candidate, values: Mapping[str, float]) -> bool:
@@ -389,7 +417,8 @@ class Search:
         found = float(np.log(tuned.NUMBER_PRIOR[len(candidates)]))
         for candidate in candidates:
             if self.in_intervals(candidate):
-                places, share = len(self.effects[candidate.effect].level_places(self.view)), 1.0
+                places = len(self.effects[candidate.effect].level_places(self.view))
+                share = candidate.likelihood
             else:
                 same = [c for c in self.candidates if c.effect == candidate.effect]
                 places = len({c.component for c in same})

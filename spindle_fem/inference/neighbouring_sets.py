@@ -92,7 +92,8 @@ def _in_place_of(
     if left is None:  # without the member, its others run away
         return []
     only_laws = not rest and not search.in_intervals(member)
-    screened, intervals = search.screened(left, fit, only_laws=only_laws)
+    moved = search.elsewhere(member, fit.values) if search.in_intervals(member) else ()
+    screened, intervals = search.screened(left, fit, only_laws=only_laws, beside=moved)
     gains = screened.singles()
     least = -tuned.EXCHANGE_PROMISES * reach
     tried: Counter[str] = Counter()

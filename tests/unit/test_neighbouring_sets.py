@@ -76,10 +76,11 @@ class NotingSearch:
         """Laws alone."""
         return False
 
-    def screened(self, fit, trust, only_laws):
+    def screened(self, fit, trust, only_laws, beside):
         """What everything promises."""
         assert trust is self.best.fit
         assert only_laws
+        assert not beside
         order = np.argsort(self.gains)[::-1]
         found = SimpleNamespace(
             variants=[Variant(item, {}) for item in self.candidates],

@@ -2,8 +2,10 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from spindle_fem.effects.catalogue.unrecorded_cooling import CLOSED
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.inference import neighbouring_sets, search_course, tuned
@@ -52,6 +54,32 @@ def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
     assert len(others) < tuned.OTHER_SPOTS
     exchanged(search)
     assert search.ranked()[0].keys == {("unrecorded_heat_source", "front_bearings")}
+
+
+def test_what_is_on_in_intervals_is_tried_in_the_same_ones_at_every_other_spot(case, heated):
+    search = search_over(case, heated)
+    effect = effect_of("unrecorded_heat_source")
+    wrong = effect.over(case.view, "rear_bearings", [(FROM, UNTIL)])
+    (lag,) = (name for name in wrong.free if name.endswith(".lag"))
+    search.remember_cost(wrong, 7.0)
+    moved = search.elsewhere(wrong, {lag: 345.0})
+    spots = {effect.over(case.view, spot, [(FROM, UNTIL)]).form for spot in effect.places(case.view)}
+    assert {v.candidate.form for v in moved} <= spots
+    assert len(moved) == len(effect.places(case.view)) - 1
+    for variant in moved:
+        here = variant.candidate
+        assert effect.intervals(here, {}) == [(FROM, UNTIL)]
+        assert [v for name, v in variant.shape.items() if name.endswith(".lag")] == [345.0]
+        assert search.cost_of(here) == 7.0
+
+
+def test_a_loss_from_within_greased_bearings_is_less_likely_than_one_from_a_housing(case, heated):
+    search = search_over(case, heated)
+    prior = {
+        spot: search.log_prior((effect_of("unrecorded_cooling").over(case.view, spot, [(FROM, UNTIL)]),))
+        for spot in ("front_bearings", "F2", "housing")
+    }
+    assert prior["F2"] == prior["front_bearings"] == pytest.approx(prior["housing"] + np.log(CLOSED))
 
 
 def test_heat_in_intervals_is_tried_in_the_place_of_a_law_beside_others(case, heated):

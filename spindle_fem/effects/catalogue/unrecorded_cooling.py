@@ -21,6 +21,9 @@ from spindle_fem.effects.framework.unrecorded import (
     when_words,
 )
 
+# How likely a loss from within greased bearings is, beside places that air or a fluid reaches. (Judgement.)
+CLOSED = 0.1
+
 
 class CoolingTerm(UnrecordedTerm):
     """Conductance from places to the surroundings.
@@ -128,6 +131,12 @@ class UnrecordedCooling(UnrecordedEffect):
             return LinkTerm(scaled, name, size, on, nominal, form == LESS)
         fluid = "ambient" if "ambient" in machine.inputs else machine.reference_temperature
         return CoolingTerm(name, amplitude("conductance", usual, "W/K"), spread, on, fluid)
+
+    def likelihood_at(self, machine: MachineView, spot: str) -> float:
+        """What is lost hardly leaves a greased bearing itself."""
+        bearings = set(machine.sets.get(spot, ()))
+        closed = machine.kind != "network" and bearings and not bearings & set(machine.oiled)
+        return CLOSED if closed else 1.0
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
         """State size and intervals of the cooling."""

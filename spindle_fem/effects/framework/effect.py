@@ -177,7 +177,7 @@ class Candidate:
     constants : mapping of str to float
         Numbers of the machine that a report needs.
     likelihood : float
-        How likely this form is before the data, beside the other forms at its place.
+        How likely this form is before the data, beside the others at its place; of intervals, beside places.
     sized_by : str
         Parameter of the machine whose factor the amplitude is fitted in units of; none when empty.
     """

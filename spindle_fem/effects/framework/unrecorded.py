@@ -387,6 +387,10 @@ class UnrecordedEffect(IntervalEffect):
         on = InIntervals(tuple(intervals), course, sizes, blurred)
         return self._candidate(machine, component, on, chosen, None)
 
+    def likelihood_at(self, machine: MachineView, spot: str) -> float:
+        """How likely it is at a spot before the data, beside the others."""
+        return 1.0
+
     def _candidate(
         self, machine: MachineView, spot: str, on: Share, form: str, quantity: RecordedQuantity | None
     ) -> Candidate:
@@ -408,6 +412,7 @@ class UnrecordedEffect(IntervalEffect):
             form=machine.form(spot, own),
             starts=starts,
             constants={"nominal": nominal} if nominal else None,
+            likelihood=self.likelihood_at(machine, spot),
         )
         parameter = f"gain.{source}" if source else ""
         parameter = next(
