@@ -194,27 +194,32 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
 
 def about_rows_amid(
     recording: Recording, drive: Drive, jumps: Sequence[tuple[int, float, float]]
-) -> tuple[list[int], list[int]]:
-    """Which changes lead to a row whose inputs lie between those of the rows beside it, and which from it.
+) -> tuple[list[int], list[int], list[int]]:
+    """Which changes lead to rows whose inputs lie between those of the rows beside them.
 
-    Such a row shows how a logger makes its rows, as means over some time or in passing, and does so for all.
+    Such rows show how a logger makes its rows, as means over some time or in passing, and does so for all.
 
     Parameters
     ----------
     jumps : sequence of (int, float, float)
         As :func:`unseen_jumps` gives them.
+
+    Returns
+    -------
+    three lists of int
+        Those that begin a change over several rows, that go on with it and that end it.
     """
     usual = float(np.median(np.diff(recording.times)))
-    to_it, from_it = [], []
-    for index, ((first, *_), (second, *_)) in enumerate(itertools.pairwise(jumps)):
+    goes_on = [False]
+    for (first, begins, _), (second, ends, _) in itertools.pairwise(jumps):
         changes = [drive.start[step] - drive.end[step - 1] for step in (first, second)]
-        apart = float(drive.grid[second] - drive.grid[first])
-        if apart <= GAP_STEPS * usual and np.any(changes[0] * changes[1] > 0.0):
-            to_it.append(index)
-            from_it.append(index + 1)
-    # Of a change over several rows none lies between two that stay.
-    ramps = {*to_it} & {*from_it}
-    return [i for i in to_it if not {i, i + 1} & ramps], [i for i in from_it if not {i, i - 1} & ramps]
+        between_rows = min(begins, ends) > -1e-6
+        near = between_rows and drive.grid[second] - drive.grid[first] <= GAP_STEPS * usual
+        goes_on.append(bool(near and np.any(changes[0] * changes[1] > 0.0)))
+    # Whether each follows on the one before, and is followed by the next.
+    beside = list(enumerate(itertools.pairwise([*goes_on, False])))
+    kinds = ((False, True), (True, True), (True, False))
+    return tuple([index for index, own in beside if own == kind] for kind in kinds)
 
 
 def jump_forcing(run: TransientRun, states: Array, jumps: Sequence[tuple[int, float, float]]) -> Array:

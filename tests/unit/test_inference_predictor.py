@@ -430,7 +430,7 @@ def test_rows_amid_a_change_tell_when_it_was_where_nothing_was_fitted(predictor,
     use = (recording.times < 1150.0) | (recording.times > 1500.0)
     blank, other = (Predictor(predictor.fast, [item], [use], step=60.0) for item in (amid, ramp))
     found = [about_rows_amid(i.recordings[0], i.drives[0], i.unread_jumps[0]) for i in (blank, other)]
-    assert found == [([0, 2, 4], [1, 3, 5]), ([], [])]
+    assert found == [([0, 2, 4], [], [1, 3, 5]), ([0], [1], [2])]
     earlier = {name: (5.0, 40.0)[i % 2] for i, (name, *_) in enumerate(blank.jumps())}
     read = interp1d(blank.drives[0].grid, blank.predict(0, earlier).temperature, axis=0)(amid.times)
     own = Predictor(predictor.fast, [replace(amid, temperature=read)], [use], step=60.0)
