@@ -76,7 +76,7 @@ class Search:
     courses: dict[str, tuple[Any, Any, float]] = field(default_factory=dict)
     _paid: dict[frozenset, float] = field(default_factory=dict)
 
-    def _families(self) -> dict[str, str]:
+    def families(self) -> dict[str, str]:
         """Bearing set of every bearing: what all of a set has, one of its bearings has not once more."""
         named = {g: self.view.component(g) for g in self.view.groups}
         return {bearing: named[g] for g in self.view.groups for bearing in self.view.sets[g]}
@@ -143,7 +143,7 @@ class Search:
         beside : sequence of Variant
             Screened as well.
         """
-        families = self._families()
+        families = self.families()
         present = {(effect, families.get(component, component)) for effect, component in fit.keys}
         allowed = [
             c for c in self.candidates if (c.effect, families.get(c.component, c.component)) not in present

@@ -86,7 +86,8 @@ def _in_place_of(
 
     There the machine is as it is known best: about what the others alone leave, it has taken up part of what
     the member does. Intervals, which fit almost anything, are sought beside others only, or in the place of
-    such. What else a lying sensor may do is tried whatever it promises: to first order it says little.
+    such; the member's own are tried at every other spot too. What else a lying sensor may do is tried
+    whatever it promises: to first order it says little.
     """
     left = search.problem.simulated(*without(fit, member), iterations=0)
     if left is None:  # without the member, its others run away
@@ -97,14 +98,28 @@ def _in_place_of(
     gains = screened.singles()
     least = -tuned.EXCHANGE_PROMISES * reach
     tried: Counter[str] = Counter()
+    warmed = {_bearings_warmed(search, member)}
     tasks: list[Task] = []
     for index, amplitude in screened.best_of(lambda c: c is not member, len(gains)):
         candidate = screened.variants[index].candidate
+        bearings = _bearings_warmed(search, candidate)
+        if bearings and bearings in warmed:
+            continue
+        warmed.add(bearings)
         tried[candidate.effect] += 1
         good = gains[index] >= least and tried[candidate.effect] <= tuned.OTHER_SPOTS
         if (good and len(tasks) < tuned.EFFECTS_EXCHANGED) or _of_one_sensor(candidate, member):
             tasks.append(search.task(left, [(screened.variants[index], amplitude)], intervals))
     return tasks
+
+
+def _bearings_warmed(search: Search, candidate: Candidate) -> tuple[str, str] | None:
+    """Effect and bearing set of what warms or cools bearings in intervals, where one does as all do."""
+    families = search.families()
+    whole = families.get(candidate.component, candidate.component)
+    if search.in_intervals(candidate) and whole in families.values():
+        return candidate.effect, whole
+    return None
 
 
 def _of_one_sensor(candidate: Candidate, member: Candidate) -> bool:

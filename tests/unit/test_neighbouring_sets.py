@@ -76,6 +76,10 @@ class NotingSearch:
         """Laws alone."""
         return False
 
+    def families(self):
+        """No bearings."""
+        return {}
+
     def screened(self, fit, trust, only_laws, beside):
         """What everything promises."""
         assert trust is self.best.fit
