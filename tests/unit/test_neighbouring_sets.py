@@ -73,18 +73,21 @@ class NotingSearch:
         return False
 
     def in_intervals(self, candidate):
-        """Laws alone."""
-        return False
+        """Whether it is unrecorded heat."""
+        return candidate.effect == "heat"
 
     def families(self):
-        """No bearings."""
-        return {}
+        """Two bearings of a set."""
+        return {"F1": "front", "F2": "front"}
+
+    def elsewhere(self, member, values):
+        """The same at the front bearings."""
+        return [Variant(law("heat", "front"), {})]
 
     def screened(self, fit, trust, only_laws, beside):
-        """What everything promises."""
+        """What everything promises; of intervals those of the member elsewhere as well."""
         assert trust is self.best.fit
-        assert only_laws
-        assert not beside
+        assert only_laws == (not beside) == (self.candidates[0].effect != "heat")
         order = np.argsort(self.gains)[::-1]
         found = SimpleNamespace(
             variants=[Variant(item, {}) for item in self.candidates],
@@ -132,6 +135,15 @@ def test_all_that_a_sensor_may_do_and_a_few_others_are_tried_in_the_place_of_its
     exchanged(search)
     few = laws[1 : 1 + tuned.EFFECTS_EXCHANGED - tuned.OTHER_SPOTS]
     assert search.asked == {identity((c,)) for c in (*places, *few, other)}
+
+
+def test_intervals_at_bearings_of_the_set_that_was_found_hide_no_other_place():
+    places = [law("heat", f"place {number}") for number in range(tuned.OTHER_SPOTS)]
+    candidates = (law("heat", "F1"), law("heat", "F2"), law("heat", "front"), *places)
+    search = NotingSearch(candidates, -np.arange(len(candidates), dtype=float))
+    search.effects = {"heat": SimpleNamespace(delays=False)}
+    exchanged(search)
+    assert search.asked == {identity((c,)) for c in places}
 
 
 @pytest.fixture
