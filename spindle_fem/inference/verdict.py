@@ -275,18 +275,27 @@ def _named(sets: _Weighed, asked: _Asked) -> Judgement:
     exact = (1.0 - nothing) * (1.0 - inexact)
     known = exact * reliable(evidence, share, more) / evidence
     probability = known * evidence
+    # How sure a set is, is how sure its last effect is: without it is listed where that is not much.
+    listed = {id(item.best) for item in near}
+    if probability < tuned.DECIDED:
+        listed |= {id(item.best) for item in _with_one_less(chosen, sets)}
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
         for item in rivals
         # A doubted further effect is listed.
-        if (known * max(item.probability, sets.by_all[item.fit.named_keys]) >= tuned.LISTED or item in near)
+        if (
+            known * max(item.probability, sets.by_all[item.fit.named_keys]) >= tuned.LISTED
+            or id(item.best) in listed
+        )
         and item.fit.candidates
     )
     # What a coarse machine gives up although it is likely shares what is left.
     over = 1.0 - probability - sum(item.probability for item in alternatives)
     given_up = [i for i in sets.before if i.fit.named_keys not in sets.by_all and i.fit.candidates]
     alternatives += tuple(
-        Ranked(i.best, over * i.probability) for i in given_up if over * i.probability >= tuned.LISTED
+        Ranked(i.best, over * i.probability)
+        for i in given_up
+        if over * i.probability >= tuned.LISTED or id(i.best) in listed
     )
     # What every likely set holds is sure, whether there is more or not.
     common = sum(item.probability for item in sets.ranked if holds(item.fit, chosen.fit, known_as_one))
@@ -314,6 +323,13 @@ def _named(sets: _Weighed, asked: _Asked) -> Judgement:
     return Judgement(
         verdict, sets.p_value, told, alternatives, 1.0 - known, reason, evidence, share, more, rest
     )
+
+
+def _with_one_less(chosen: Ranked, sets: _Weighed) -> list[Ranked]:
+    """The most probable set of all effects of another but one, by all readings; none of a single one."""
+    keys = chosen.fit.named_keys
+    fewer = [i for i in sets.before if i.fit.named_keys < keys and len(i.fit.named_keys) == len(keys) - 1 > 0]
+    return fewer[:1]
 
 
 def _near(chosen: Ranked, rivals: Sequence[Ranked], sets: _Weighed, asked: _Asked) -> list[Ranked]:

@@ -256,6 +256,19 @@ def test_the_same_elsewhere_in_a_set_and_sets_of_another_size_are_no_rivals():
     assert all(item.probability >= tuned.LISTED for item in found.alternatives)
 
 
+def test_of_a_set_that_is_not_sure_the_likeliest_without_one_effect_is_listed():
+    null, one = hypothesis(misfit=9000.0), hypothesis(PRELOAD, misfit=900.0)
+    other, two = hypothesis(CHURNING, misfit=950.0), hypothesis(PRELOAD, CHURNING, misfit=700.0)
+    found = verdict(null, one, other, two)
+    assert found.chosen.fit.keys == two.keys
+    assert found.chosen.probability < tuned.DECIDED
+    assert [item.fit.keys for item in found.alternatives] == [one.keys]
+    assert found.alternatives[0].probability < tuned.LISTED
+    sure = verdict(null, one, other, hypothesis(PRELOAD, CHURNING, misfit=-9000.0))
+    assert sure.chosen.probability > tuned.DECIDED
+    assert sure.alternatives == ()
+
+
 def test_physics_comes_before_parameters_before_sensors():
     assert kind_of([OFFSET, SCALE, PRELOAD]) == "missing_physics"
     assert kind_of([OFFSET, SCALE]) == "parameter"
