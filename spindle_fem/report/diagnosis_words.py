@@ -11,6 +11,8 @@ from spindle_fem.report.table_rows import significant
 
 # P-values below are too small for the models behind them to mean their digits.
 LEAST_LEVEL = 0.001
+# Probability from which a set of fewer effects is named as one that the data cannot tell apart.
+LIKELY = 0.02
 
 VERDICTS = {
     "consistent": "nothing is missing",
@@ -51,7 +53,12 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         )
     if verdict == "ambiguous":
         sets = [(content["findings"], content.get("set_probability"))]
-        sets += [(item["findings"], item["probability"]) for item in content["alternatives"]]
+        # One effect less is no other answer, unless it is likely.
+        sets += [
+            (item["findings"], item["probability"])
+            for item in content["alternatives"]
+            if item["probability"] >= LIKELY or len(item["findings"]) >= len(content["findings"])
+        ]
         options = [f"{set_words(items)} ({chance(value)})" for items, value in sets]
         reason = str(content.get("reason") or "several sets explain the data").rstrip(".")
         if len(options) == 1:

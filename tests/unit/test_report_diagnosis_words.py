@@ -97,6 +97,10 @@ def test_one_set_that_is_doubted_is_not_told_apart_from_others():
     rival = told["findings"][0] | {"component": "flange"}
     several = told | {"alternatives": [{"findings": [rival], "probability": 0.3}]}
     assert "cannot tell apart" in verdict_sentence(several)
+    pair = told | {"findings": [*told["findings"], rival]}
+    less = [{"findings": [rival], "probability": chance} for chance in (0.3, 0.004)]
+    told_apart = ["cannot tell apart" in verdict_sentence(pair | {"alternatives": [item]}) for item in less]
+    assert told_apart == [True, False]
 
 
 def test_a_consistent_machine_needs_no_check_for_what_is_merely_not_ruled_out():
