@@ -35,3 +35,10 @@ def read_causes(path: Path, seed: int | None, generator: str = SPINDLE) -> dict[
             raise BadInputError(name, "stands there twice.", "Keep one.")
         found[entry["case"]] = entry
     return found
+
+
+def read_note(path: Path, seed: int | None, generator: str = SPINDLE) -> str:
+    """What is to be known of a study, as a ``[[study]]`` of the file has it; nothing where it has none."""
+    entries = tomllib.loads(path.read_text(encoding="utf-8")).get("study", [])
+    own = [e["note"] for e in entries if (e["seed"], e.get("generator", SPINDLE)) == (seed, generator)]
+    return " ".join(own)

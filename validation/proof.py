@@ -18,7 +18,7 @@ import jinja2
 import numpy as np
 
 from . import riddle
-from .causes import OPEN, SPINDLE, read_causes, study_seed
+from .causes import OPEN, SPINDLE, read_causes, read_note, study_seed
 from .score import reliability
 from .score_families import percent, score_study, states_of, summary
 
@@ -71,6 +71,7 @@ def read_study(study: Path, results: Path) -> dict[str, Any]:
         "rows": rows,
         **figures_of(rows),
         "causes": causes_of(rows, study_seed(study), generator),
+        "note": read_note(CAUSES, study_seed(study), generator),
         **rounded({"kept_back": kept_back(results), "plan": planned(results)}),
     }
 

@@ -12,6 +12,7 @@ from book.page import Chapter, Entry, Pictures, render_chapter
 from book.work import Desk
 from spindle_fem.errors import BadInputError
 from spindle_fem.report.block_page import Section, Text
+from validation.causes import read_note
 
 
 @pytest.fixture
@@ -138,6 +139,14 @@ def test_causes_of_one_seed(tmp_path):
     path.write_text('[[case]]\nseed = 7\ncase = "case_0002"\n', encoding="utf-8")
     with pytest.raises(BadInputError, match="case_0002 of seed 7: is incomplete"):
         causes.read_causes(path, 7)
+
+
+def test_the_note_of_one_study(tmp_path):
+    path = tmp_path / "causes.toml"
+    entry = '[[study]]\ngenerator = "rough"\nseed = {seed}\nnote = "seen before {seed}"\n'
+    path.write_text(entry.format(seed=7) + entry.format(seed=8), encoding="utf-8")
+    assert read_note(path, 8, "rough") == "seen before 8"
+    assert read_note(path, 8, "networks") == read_note(path, 9, "rough") == ""
 
 
 def test_the_causes_that_ship_can_be_read():
