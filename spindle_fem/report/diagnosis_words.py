@@ -7,12 +7,11 @@ from typing import Any
 
 from spindle_fem.effects.framework.effect import capital, place_words
 from spindle_fem.effects.registry import catalogue
+from spindle_fem.inference import tuned
 from spindle_fem.report.table_rows import significant
 
 # P-values below are too small for the models behind them to mean their digits.
 LEAST_LEVEL = 0.001
-# Probability from which a set of fewer effects is named as one that the data cannot tell apart.
-LIKELY = 0.02
 
 VERDICTS = {
     "consistent": "nothing is missing",
@@ -57,7 +56,7 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         sets += [
             (item["findings"], item["probability"])
             for item in content["alternatives"]
-            if item["probability"] >= LIKELY or len(item["findings"]) >= len(content["findings"])
+            if item["probability"] >= tuned.LISTED or len(item["findings"]) >= len(content["findings"])
         ]
         options = [f"{set_words(items)} ({chance(value)})" for items, value in sets]
         reason = str(content.get("reason") or "several sets explain the data").rstrip(".")
