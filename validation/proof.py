@@ -70,8 +70,7 @@ def read_study(study: Path, results: Path) -> dict[str, Any]:
         "commit": json.loads(run.read_text(encoding="utf-8"))["commit"] if run.exists() else None,
         "rows": rows,
         **figures_of(rows),
-        "causes": causes_of(rows, study_seed(study), generator),
-        "note": read_note(CAUSES, study_seed(study), generator),
+        **written_of(rows, study_seed(study), generator),
         **rounded({"kept_back": kept_back(results), "plan": planned(results)}),
     }
 
@@ -98,13 +97,16 @@ def causes_of(rows: list[dict[str, Any]], seed: int | None, generator: str) -> d
     return {case: {k: causes.get(case, {}).get(k, OPEN) for k in ("kind", "cause")} for case in wrong}
 
 
+def written_of(rows: list[dict[str, Any]], seed: int | None, generator: str) -> dict[str, Any]:
+    """What is written down by hand of a study: causes of its wrong cases, and what is to be known of it."""
+    return {"causes": causes_of(rows, seed, generator), "note": read_note(CAUSES, seed, generator)}
+
+
 def kept_studies(known: list[dict[str, Any]], given: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Studies of an earlier page that are not given again, with the causes that are known now."""
+    """Studies of an earlier page that are not given again, with the causes and notes that are known now."""
     names = {study["name"] for study in given}
     return [
-        study
-        | figures_of(study["rows"])
-        | {"causes": causes_of(study["rows"], study["seed"], study["generator"])}
+        study | figures_of(study["rows"]) | written_of(study["rows"], study["seed"], study["generator"])
         for study in known
         if study["name"] not in names
     ]

@@ -123,9 +123,11 @@ def test_studies_that_stay_on_the_page_have_the_causes_that_are_known_now(data, 
     other = study | {"name": "earlier"}
     cause = {"kind": "twin", "cause": "Both read the same."}
     monkeypatch.setattr(proof, "read_causes", lambda *ignored: {"case_0002": cause | {"seed": 1}})
+    monkeypatch.setattr(proof, "read_note", lambda *ignored: "Seen before.")
     (kept,) = proof.kept_studies([study, other], [study])
     assert kept["name"] == "earlier"
     assert kept["causes"] == {"case_0002": cause}
+    assert kept["note"] == "Seen before."
     assert kept["rows"] == study["rows"]
 
 
