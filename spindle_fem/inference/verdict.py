@@ -276,16 +276,14 @@ def _named(sets: _Weighed, asked: _Asked) -> Judgement:
     known = exact * reliable(evidence, share, more) / evidence
     probability = known * evidence
     # How sure a set is, is how sure its last effect is: without it is listed where that is not much.
-    listed = {id(item.best) for item in near}
-    if probability < tuned.DECIDED:
-        listed |= {id(item.best) for item in _with_one_less(chosen, sets)}
+    listed = [*near, *(_with_one_less(chosen, sets, asked) if probability < tuned.DECIDED else ())]
     alternatives = tuple(
         Ranked(item.best, known * item.probability)
         for item in rivals
         # A doubted further effect is listed.
         if (
             known * max(item.probability, sets.by_all[item.fit.named_keys]) >= tuned.LISTED
-            or id(item.best) in listed
+            or any(are_alike(item.fit, one.fit, known_as_one) for one in listed)
         )
         and item.fit.candidates
     )
@@ -295,7 +293,7 @@ def _named(sets: _Weighed, asked: _Asked) -> Judgement:
     alternatives += tuple(
         Ranked(i.best, over * i.probability)
         for i in given_up
-        if over * i.probability >= tuned.LISTED or id(i.best) in listed
+        if over * i.probability >= tuned.LISTED or any(i.best is one.best for one in listed)
     )
     # What every likely set holds is sure, whether there is more or not.
     common = sum(item.probability for item in sets.ranked if holds(item.fit, chosen.fit, known_as_one))
@@ -325,11 +323,14 @@ def _named(sets: _Weighed, asked: _Asked) -> Judgement:
     )
 
 
-def _with_one_less(chosen: Ranked, sets: _Weighed) -> list[Ranked]:
+def _with_one_less(chosen: Ranked, sets: _Weighed, asked: _Asked) -> list[Ranked]:
     """The most probable set of all effects of another but one, by all readings; none of a single one."""
-    keys = chosen.fit.named_keys
-    fewer = [i for i in sets.before if i.fit.named_keys < keys and len(i.fit.named_keys) == len(keys) - 1 > 0]
-    return fewer[:1]
+    size = len(chosen.fit.named_keys) - 1
+    return [
+        i
+        for i in sets.before
+        if len(i.fit.named_keys) == size > 0 and holds(chosen.fit, i.fit, asked.overlapping)
+    ][:1]
 
 
 def _near(chosen: Ranked, rivals: Sequence[Ranked], sets: _Weighed, asked: _Asked) -> list[Ranked]:
