@@ -267,19 +267,21 @@ class Search:
         return self._paid.get(identity((candidate,)), 0.0)
 
     def elsewhere(self, member: Candidate, values: Mapping[str, float]) -> list[Variant]:
-        """What is on in intervals at every other spot, in the same ones and with the same lag."""
+        """What is on in intervals at every other spot, in the same ones at their cost, with the same lag."""
         effect = self.effects[member.effect]
-        spans = effect.intervals(member, values)
-        known = {item.name: values[name] for name, item in member.parameters.items() if name in values}
+        spans, cost = effect.intervals(member, values), self.cost_of(member)
+        known = {
+            p.name: values[n] for n, p in member.parameters.items() if n != member.amplitude and n in values
+        }
         found = []
-        for other, pattern in self.patterns():
-            if other.name == member.effect:
-                here = effect.over(self.view, pattern.spot, spans)
-                here = replace(here, reference=member.reference, recording=member.recording)
-                if identity((here,)) != identity((member,)):
-                    self.remember_cost(here, self.cost_of(member))
-                    own = {n: known[p.name] for n, p in here.free.items() if p.name in known}
-                    found.append(Variant(here, {n: v for n, v in own.items() if n != here.amplitude}))
+        for spot in [pattern.spot for other, pattern in self.patterns() if other.name == member.effect]:
+            here = effect.over(self.view, spot, spans)
+            here = replace(here, reference=member.reference, recording=member.recording)
+            if identity((here,)) != identity((member,)):
+                self.remember_cost(here, cost)
+                found.append(
+                    Variant(here, {n: known[p.name] for n, p in here.free.items() if p.name in known})
+                )
         return found
 
     def hypothesis(self, fit: Fit, paid: float = 0.0) -> Hypothesis:
