@@ -69,6 +69,19 @@ def test_a_fit_that_leaves_much_tells_no_clock(case):
         assert (values != left.values) is told
 
 
+def test_putting_a_clock_right_leaves_what_each_channel_is_late_in_all(case):
+    """What channels share goes into the stamps, and is taken off where the next fit begins."""
+    predictor, problem = read_late(case, 45.0)
+    fit = problem.fit()
+    moved, values = restamped(predictor, fit)
+    clock, *own = [item.coordinate for item in predictor.misdescribed if item.delays][::-1]
+    shared = np.median([*(fit.values[name] for name in own), 0.0])
+    assert abs(shared) > 0.5
+    assert moved.late[0] == pytest.approx(fit.values[clock] + shared)
+    assert moved.late[0] + values[clock] == pytest.approx(fit.values[clock])
+    assert all(values[name] == fit.values[name] for name in own)
+
+
 def test_readings_are_told_on_their_own_stamps(case):
     predictor, _ = read_late(case, 45.0)
     moved = predictor.on_clocks(np.array([45.0]))
