@@ -86,13 +86,28 @@ def holds(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> b
     return not left
 
 
-def with_needed_effects(ranked: Sequence[Ranked]) -> list[Ranked]:
-    """Sets, each with an effect more than another less probable beside it, by ``FURTHER_EFFECT``.
+def odds_needed(fit: Fit, fewer: Fit, overlapping: Mapping[str, frozenset[str]]) -> float:
+    """Odds over a set without it that a further effect needs.
 
-    Laws are not exact, and what a strong effect's law leaves a further effect may fit. A set and all that add
-    one effect to it keep their probability together. A set that adds to several is weighed beside the most
-    probable of them.
+    Laws are not exact, and what one leaves another fits, most of all one of the same place: of the same
+    bearings, or of the same face.
     """
+    (further,) = [c for c in fit.named if (c.effect, c.component) not in fewer.named_keys]
+    places = {further.component, *overlapping.get(further.component, ())}
+    laws = [c for c in fewer.named if "sensor" not in (c.kind, further.kind)]
+    beside_itself = any(law.component in places for law in laws)
+    return tuned.FURTHER_AT_ITS_PLACE if beside_itself else tuned.FURTHER_EFFECT
+
+
+def with_needed_effects(
+    ranked: Sequence[Ranked], overlapping: Mapping[str, frozenset[str]]
+) -> list[Ranked]:
+    """Sets, each with an effect more than another less probable beside it, by :func:`odds_needed`.
+
+    A set and all that add one effect to it keep their probability together. A set that adds to several is
+    weighed beside the most probable of them.
+    """
+    fits = {item.fit.named_keys: item.fit for item in ranked}
     shares = {item.fit.named_keys: item.probability for item in ranked}
     for size in range(2, 1 + max(len(keys) for keys in shares)):
         beside: dict[frozenset, list[frozenset]] = {}
@@ -101,7 +116,9 @@ def with_needed_effects(ranked: Sequence[Ranked]) -> list[Ranked]:
             if smaller:
                 beside.setdefault(max(smaller, key=shares.__getitem__), []).append(keys)
         for base, richer in beside.items():
-            group = {base: shares[base]} | {keys: shares[keys] / tuned.FURTHER_EFFECT for keys in richer}
+            group = {base: shares[base]} | {
+                keys: shares[keys] / odds_needed(fits[keys], fits[base], overlapping) for keys in richer
+            }
             whole = sum(shares[keys] for keys in group)
             scale = whole / max(sum(group.values()), np.finfo(float).tiny)
             shares |= {keys: weight * scale for keys, weight in group.items()}
@@ -160,7 +177,7 @@ def told_by_readings(chosen: Hypothesis, other: Hypothesis, coarseness: float) -
     gain = other.misfit - chosen.misfit
     if chosen.heldout is not None and other.heldout is not None:
         gain += other.heldout - chosen.heldout
-    return 0.5 * gain / (tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness)))
+    return 0.5 * gain / (tuned.GAIN_DIVISOR * float(np.sqrt(coarseness)))
 
 
 def _repeats(fit: Fit, other: Fit) -> bool:

@@ -45,7 +45,7 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
         How many times less a gain counts between sizes than on a machine that is drawn; between sets of one
         size, which share some of what a coarse model leaves, its square root.
     """
-    in_a_size = tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.sqrt(coarseness))
+    in_a_size = tuned.GAIN_DIVISOR * float(np.sqrt(coarseness))
     null = next(h for h in hypotheses if not h.fit.candidates)
     gains = [null.misfit - h.misfit for h in hypotheses]
     if all(h.heldout is not None for h in hypotheses):

@@ -219,7 +219,7 @@ def _weighed(hypotheses: Sequence[Hypothesis], trials: int, asked: _Asked) -> _W
     if p_value <= tuned.SIGNIFICANT and not stays:
         ranked = _without(ranked, empty)
     by_all = {item.fit.named_keys: item.probability for item in ranked}
-    told = ranked if is_coarse else with_needed_effects(ranked)
+    told = ranked if is_coarse else with_needed_effects(ranked, asked.overlapping)
     told = without_repeats(told, asked.apart, asked.overlapping, coarseness)
     told = likeliest_first(told, asked.overlapping)
     return _Weighed(
@@ -337,7 +337,7 @@ def _near(chosen: Ranked, rivals: Sequence[Ranked], sets: _Weighed, asked: _Aske
     """Rivals whose readings are those of the chosen set within the noise."""
     # What held-out readings say of a rival is asked by itself.
     first, others = as_one(list(sets.by_fitted.values()), asked.overlapping)
-    likely = [item.fit for item in (first, *others) if item.probability >= tuned.NEAR_PROBABILITY]
+    likely = [item.fit for item in (first, *others) if item.probability >= tuned.LISTED]
     return [
         item
         for item in rivals

@@ -9,18 +9,20 @@ import pytest
 from spindle_fem.inference import like_sets, tuned
 from spindle_fem.inference.final_fits import to_be_fitted
 from spindle_fem.inference.hypothesis import Ranked
-from spindle_fem.inference.like_sets import are_alike, with_needed_effects
+from spindle_fem.inference.like_sets import are_alike, odds_needed, with_needed_effects
 from spindle_fem.inference.set_odds import rank
 from spindle_fem.inference.verdict import NEAR_REASON
 from tests.support.made_hypotheses import CHURNING, OFFSET, PRELOAD, candidate, hypothesis, verdict
 
+IN_REAR = replace(CHURNING, component="rear_bearings")
+
 
 def test_a_further_effect_is_less_probable_beside_the_likeliest_set_that_lacks_it():
-    single, other = hypothesis(PRELOAD, misfit=400.0), hypothesis(CHURNING, misfit=400.0)
-    pair, twin = (hypothesis(PRELOAD, second, misfit=400.0) for second in (CHURNING, OFFSET))
-    triple = hypothesis(PRELOAD, CHURNING, OFFSET, misfit=400.0)
+    single, other = hypothesis(PRELOAD, misfit=400.0), hypothesis(IN_REAR, misfit=400.0)
+    pair, twin = (hypothesis(PRELOAD, second, misfit=400.0) for second in (IN_REAR, OFFSET))
+    triple = hypothesis(PRELOAD, IN_REAR, OFFSET, misfit=400.0)
     items, before = (single, other, pair, twin, triple), (0.06, 0.04, 0.3, 0.1, 0.5)
-    ranked = with_needed_effects([Ranked(*own) for own in zip(items, before, strict=True)])
+    ranked = with_needed_effects([Ranked(*own) for own in zip(items, before, strict=True)], {})
     told = [item.probability for item in ranked]
     assert told == sorted(told, reverse=True)
     assert sum(told) == pytest.approx(1.0)
@@ -36,8 +38,23 @@ def test_a_further_effect_is_less_probable_beside_the_likeliest_set_that_lacks_i
 
 def test_nothing_missing_and_sets_without_a_smaller_one_are_not_doubted():
     nothing, pair = hypothesis(misfit=900.0), hypothesis(PRELOAD, CHURNING, misfit=400.0)
-    ranked = with_needed_effects([Ranked(pair, 0.9), Ranked(nothing, 0.1)])
+    ranked = with_needed_effects([Ranked(pair, 0.9), Ranked(nothing, 0.1)], {})
     assert [item.probability for item in ranked] == [0.9, 0.1]
+
+
+@pytest.mark.parametrize(
+    ("further", "odds"),
+    [
+        (CHURNING, tuned.FURTHER_AT_ITS_PLACE),
+        (replace(CHURNING, component="F1"), tuned.FURTHER_AT_ITS_PLACE),
+        (IN_REAR, tuned.FURTHER_EFFECT),
+        (replace(OFFSET, component="F1"), tuned.FURTHER_EFFECT),
+    ],
+)
+def test_a_further_law_beside_one_of_the_same_place_needs_more(further, odds):
+    group = dict.fromkeys(("front_bearings", "F1"), frozenset({"F1", "front_bearings"}))
+    fewer, more = hypothesis(PRELOAD, misfit=400.0).fit, hypothesis(PRELOAD, further, misfit=400.0).fit
+    assert odds_needed(more, fewer, group) == odds
 
 
 @pytest.mark.parametrize(("coarseness", "members"), [(1.0, 2), (1.1, 3)])
@@ -98,11 +115,11 @@ def test_a_rival_is_one_by_what_fitted_readings_say_of_it():
 
     def said(share):
         """Of a set that reads alike, so probable by fitted readings, three times as probable by all."""
-        gain = 2.0 * tuned.GAIN_DIVISOR_IN_A_SIZE * float(np.log(3.0))
+        gain = 2.0 * tuned.GAIN_DIVISOR * float(np.log(3.0))
         rival = hypothesis(CHURNING, misfit=400.0, log_prior=float(np.log(share)))
         return verdict(nothing, best, replace(rival, heldout=500.0 - gain), apart=lambda one, other: 0.0)
 
-    least = tuned.NEAR_PROBABILITY
+    least = tuned.LISTED
     assert (said(1.2 * least).verdict, said(1.2 * least).reason) == ("ambiguous", NEAR_REASON)
     assert said(0.8 * least).verdict == "missing_physics"
 
@@ -111,7 +128,7 @@ def test_rivals_at_places_that_count_as_one_are_one_rival():
     places = ("front_bearings", "F1", "F2")
     group = dict.fromkeys(places, frozenset(places))
     found = [hypothesis(misfit=1400.0), hypothesis(PRELOAD, misfit=400.0)]
-    each = 0.7 * tuned.NEAR_PROBABILITY
+    each = 0.7 * tuned.LISTED
     found += [
         hypothesis(replace(CHURNING, component=place), misfit=400.0, log_prior=float(np.log(each)))
         for place in places[:2]
@@ -144,7 +161,7 @@ def test_heat_without_a_name_is_no_rival_for_a_law_at_its_place(monkeypatch):
     assert named.chosen.fit.candidates == (CHURNING,)
     assert named.evidence > 0.99
     assert not named.alternatives
-    spoken = 2.0 * tuned.GAIN_DIVISOR_IN_A_SIZE * tuned.LEAST_HELDOUT_GAIN
+    spoken = 2.0 * tuned.GAIN_DIVISOR * tuned.LEAST_HELDOUT_GAIN
     assert said(CHURNING, "F2", misfit=400.1 - spoken, log_prior=2.0).chosen.fit.candidates == (CHURNING,)
     heat = said(CHURNING, "F2", misfit=399.9 - spoken, log_prior=2.0)
     assert heat.chosen.fit.candidates[0].effect == "unrecorded_heat_source"

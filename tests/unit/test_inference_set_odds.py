@@ -41,7 +41,7 @@ def test_differences_of_likelihood_count_by_the_temperature():
     worse = hypothesis(CHURNING, misfit=408.0)
     ranked = rank([worse, better, hypothesis(misfit=420.0, evidence=-1e4)])
     odds = ranked[0].probability / ranked[1].probability
-    assert odds == pytest.approx(np.exp(4.0 / tuned.GAIN_DIVISOR_IN_A_SIZE))
+    assert odds == pytest.approx(np.exp(4.0 / tuned.GAIN_DIVISOR))
 
 
 def test_held_out_readings_count_among_sets_as_fitted_ones_do():
@@ -51,11 +51,11 @@ def test_held_out_readings_count_among_sets_as_fitted_ones_do():
     ranked = rank([nothing, better, told])
     assert ranked[0].fit is told.fit
     odds = ranked[0].probability / ranked[1].probability
-    assert odds == pytest.approx(np.exp((7.0 - 4.0) / tuned.GAIN_DIVISOR_IN_A_SIZE))
+    assert odds == pytest.approx(np.exp((7.0 - 4.0) / tuned.GAIN_DIVISOR))
     # on a coarse machine likewise; a set without them has none to compare
     ranked = rank([nothing, better, told], 4.0)
     odds = ranked[0].probability / ranked[1].probability
-    assert odds == pytest.approx(np.exp((7.0 - 4.0) / (2.0 * tuned.GAIN_DIVISOR_IN_A_SIZE)))
+    assert odds == pytest.approx(np.exp((7.0 - 4.0) / (2.0 * tuned.GAIN_DIVISOR)))
     assert rank([nothing, better, replace(told, heldout=None)])[0].fit is better.fit
 
 
@@ -137,7 +137,7 @@ def test_what_a_strong_effect_leaves_counts_less_for_one_more():
     assert weak > 1.5 * strong
     ratio = odds(600.0, pair, single) / odds(50000.0, pair, single)
     assert ratio == pytest.approx(np.exp((weak - strong) / tuned.GAIN_DIVISOR))
-    assert odds(50000.0, rival, single) == pytest.approx(np.exp(10.0 / tuned.GAIN_DIVISOR_IN_A_SIZE))
+    assert odds(50000.0, rival, single) == pytest.approx(np.exp(10.0 / tuned.GAIN_DIVISOR))
 
 
 def test_the_most_probable_set_of_a_size_stands_for_it():

@@ -177,7 +177,7 @@ def test_what_one_set_gains_over_another_of_its_size_counts_less_where_the_model
         likely = {item.fit.keys: item.probability for item in rank(sets, coarseness) if item.fit.keys}
         odds.append(np.log(likely[sets[1].keys] / likely[sets[2].keys]))
     assert odds[0] == pytest.approx(2.0 * odds[1])
-    assert odds[0] == pytest.approx(9.0 / tuned.GAIN_DIVISOR_IN_A_SIZE)
+    assert odds[0] == pytest.approx(9.0 / tuned.GAIN_DIVISOR)
 
 
 def test_nothing_missing_of_a_coarse_machine_stays_where_it_is_likelier_than_all_sets():
