@@ -99,9 +99,7 @@ def odds_needed(fit: Fit, fewer: Fit, overlapping: Mapping[str, frozenset[str]])
     return tuned.FURTHER_AT_ITS_PLACE if beside_itself else tuned.FURTHER_EFFECT
 
 
-def with_needed_effects(
-    ranked: Sequence[Ranked], overlapping: Mapping[str, frozenset[str]]
-) -> list[Ranked]:
+def with_needed_effects(ranked: Sequence[Ranked], overlapping: Mapping[str, frozenset[str]]) -> list[Ranked]:
     """Sets, each with an effect more than another less probable beside it, by :func:`odds_needed`.
 
     A set and all that add one effect to it keep their probability together. A set that adds to several is
