@@ -92,7 +92,7 @@ def odds_needed(fit: Fit, fewer: Fit, overlapping: Mapping[str, frozenset[str]])
     Laws are not exact, and what one leaves another fits, most of all one of the same place: of the same
     bearings, or of the same face.
     """
-    (further,) = [c for c in fit.named if (c.effect, c.component) not in fewer.named_keys]
+    further = next(c for c in fit.named if (c.effect, c.component) not in fewer.named_keys)
     places = {further.component, *overlapping.get(further.component, ())}
     laws = [c for c in fewer.named if "sensor" not in (c.kind, further.kind)]
     beside_itself = any(law.component in places for law in laws)

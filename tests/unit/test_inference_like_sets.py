@@ -55,6 +55,9 @@ def test_a_further_law_beside_one_of_the_same_place_needs_more(further, odds):
     group = dict.fromkeys(("front_bearings", "F1"), frozenset({"F1", "front_bearings"}))
     fewer, more = hypothesis(PRELOAD, misfit=400.0).fit, hypothesis(PRELOAD, further, misfit=400.0).fit
     assert odds_needed(more, fewer, group) == odds
+    # Twice at one place is one effect.
+    twice = hypothesis(PRELOAD, further, replace(further, form="elsewhere in it"), misfit=400.0).fit
+    assert odds_needed(twice, fewer, group) == odds
 
 
 @pytest.mark.parametrize(("coarseness", "members"), [(1.0, 2), (1.1, 3)])
