@@ -17,6 +17,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -200,6 +201,7 @@ def render_document(
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["breakable"] = breakable
     scripts = [block.script for section in sections for block in section.blocks if block.kind == "part"]
     return environment.get_template("page.html.j2").render(
         kind=kind,
@@ -210,3 +212,16 @@ def render_document(
         scripts=scripts,
         program_version=__version__,
     )
+
+
+def breakable(cell: object) -> object:
+    """A cell in which a key of a definition may go on in the next line after each of its dots.
+
+    >>> print(breakable("part.housing < 0.5"))
+    part.<wbr>housing &lt; 0.5
+    """
+    from markupsafe import Markup, escape
+
+    if isinstance(cell, Markup):
+        return cell
+    return Markup(re.sub(r"(?<=\w\.)(?=[a-z])", "<wbr>", escape(cell)))
