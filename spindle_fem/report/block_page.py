@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from PIL.Image import Image
 
+# A word of more letters than a narrow column has room for.
+LONG_KEY = re.compile(r"[\w.]{20,}")
+
 
 @dataclass(frozen=True, slots=True)
 class Text:
@@ -215,13 +218,13 @@ def render_document(
 
 
 def breakable(cell: object) -> object:
-    """A cell in which a key of a definition may go on in the next line after each of its dots.
+    """A cell in which a long key of a definition may go on in the next line after each of its dots.
 
-    >>> print(breakable("part.housing < 0.5"))
-    part.<wbr>housing &lt; 0.5
+    >>> print(breakable("part.housing.segment.length < 0.5"))
+    part.<wbr>housing.<wbr>segment.<wbr>length &lt; 0.5
     """
     from markupsafe import Markup, escape
 
     if isinstance(cell, Markup):
         return cell
-    return Markup(re.sub(r"(?<=\w\.)(?=[a-z])", "<wbr>", escape(cell)))
+    return Markup(LONG_KEY.sub(lambda found: found[0].replace(".", ".<wbr>"), escape(cell)))
