@@ -51,7 +51,7 @@ def render(result: ThermalResult) -> str:
 class Page(HTMLParser):
     """Tags, identifiers and links of a page; fails where tags do not close."""
 
-    VOID = frozenset({"meta", "img", "input", "br", "hr", "link"})
+    VOID = frozenset({"meta", "img", "input", "br", "hr", "link", "wbr"})
 
     def __init__(self, text: str) -> None:
         super().__init__()
