@@ -9,6 +9,9 @@ from spindle_fem.report.block_page import Notice, Section, Table, Text
 from spindle_fem.report.diagnosis_tables import recording_fields
 from spindle_fem.report.table_rows import fixed, table_of, words
 
+# Sources of errors where there is one fit: both models.
+ONE_FIT = 2
+
 
 def full_model_sections(content: Mapping[str, Any]) -> list[Section]:
     """Section on the full model; none unless the full model was requested.
@@ -24,35 +27,43 @@ def full_model_sections(content: Mapping[str, Any]) -> list[Section]:
     found = content["fit"].get("full_model") or {"mesh": "off"}
     if found["mesh"] == "off":
         return []
-    title = "The full model, before and after"
     if found["reason"] is not None:
-        return [Section("full_model", title, [Notice(found["reason"])])]
-    return [Section("full_model", title, [Text(_words(found)), *_tables(content, found)])]
+        return [Section("full_model", "The full model", [Notice(found["reason"])])]
+    # Where nothing was found there is one fit.
+    fits = ("before", "after") if content["findings"] else ("after",)
+    title = f"The full model{', before and after' if len(fits) > 1 else ''}"
+    return [Section("full_model", title, [Text(_words(found, fits)), *_tables(content, found, fits)])]
 
 
-def _words(found: Mapping[str, Any]) -> str:
+def _words(found: Mapping[str, Any], fits: Sequence[str]) -> str:
     order = "linear" if found["order"] == 1 else "quadratic"
+    steps = (
+        f"{found['before']['steps']} time steps before and {found['after']['steps']} after"
+        if len(fits) > 1
+        else f"{found['after']['steps']} time steps"
+    )
     text = (
         f"The same physics and parameters on the {found['preset']} mesh, {order} temperatures, "
-        f"{found['unknowns']} of them, iterated with the loads through {found['before']['steps']} time steps "
-        f"before and {found['after']['steps']} after, each within "
+        f"{found['unknowns']} of them, iterated with the loads through {steps}, each within "
         f"{found['step_error_K']:.2g} K in the mean over the machine."
-    )
-    text += (
         " Its mesh is not that of the fast model: readings are up to "
-        f"{_largest(found['differences'], 'after_K'):.2g} K apart. On what the two fits differ by, both "
-        f"models agree within {_largest(found['differences'], 'change_K'):.2g} K."
+        f"{_largest(found['differences'], 'after_K'):.2g} K apart."
     )
-    if left := found.get("left"):
+    if len(fits) > 1:
+        text += (
+            " On what the two fits differ by, both models agree within "
+            f"{_largest(found['differences'], 'change_K'):.2g} K."
+        )
+    if (left := found.get("left")) and len(fits) > 1:
         text += (
             f" With that change the set leaves {left['full']:.2g} times the errors expected of the readings, "
             f"{left['fast']:.2g} times on the fast model."
         )
     # Folders of before have none.
     if moved := found.get("displacement_differences"):
+        text += f" Displacements are up to {_largest(moved, 'after_um'):.2g} µm apart"
         text += (
-            f" Displacements are up to {_largest(moved, 'after_um'):.2g} µm apart, on what the fits differ "
-            f"by {_largest(moved, 'change_um'):.2g} µm."
+            f", on what the fits differ by {_largest(moved, 'change_um'):.2g} µm." if len(fits) > 1 else "."
         )
     return text + (f" Not of the mesh but added: {found['first_order']}." if found["first_order"] else "")
 
@@ -61,11 +72,15 @@ def _largest(differences: Sequence[Mapping[str, Any]], key: str) -> float:
     return max(row[key] for row in differences)
 
 
-def _tables(content: Mapping[str, Any], found: Mapping[str, Any]) -> list[Table]:
+def _tables(content: Mapping[str, Any], found: Mapping[str, Any], fits: Sequence[str]) -> list[Table]:
     fit = content["fit"]
+
+    def named(name: str, model: str) -> str:
+        return f"{name}, {model}" if len(fits) > 1 else model
+
     errors = [
-        {"model": f"{name}, {model}", "seconds": None, **values}
-        for name in ("before", "after")
+        {"model": named(name, model), "seconds": None, **values}
+        for name in fits
         for model, values in (("fast model", fit[name]), ("full model", found[name]))
     ]
     models = (
@@ -78,21 +93,19 @@ def _tables(content: Mapping[str, Any], found: Mapping[str, Any]) -> list[Table]
     noise = fixed("noise / K", "noise_K", 3)
     level = noise.cell(fit)
     by_model.rows.append({"cells": ["noise", level, level, ""]})
-    temperatures = {
-        "before, fast model": content["mismatch"]["channels"],
-        "before, full model": found["before"]["channels"],
-        "after, fast model": fit["channels_after"],
-        "after, full model": found["after"]["channels"],
-    }
-    tables = [by_model, *_by_channel(temperatures, found["differences"], "channel", "K")]
-    if moved := found.get("displacement_differences"):
-        displacements = {
-            "before, fast model": content["mismatch"]["displacements"],
-            "before, full model": found["before"]["displacements"],
-            "after, fast model": fit["displacements_after"],
-            "after, full model": found["after"]["displacements"],
+
+    def by_channel(kind: str, differences: Sequence[Mapping[str, Any]], what: str, unit: str) -> list[Table]:
+        fast = {"before": content["mismatch"][kind], "after": fit[f"{kind}_after"]}
+        sources = {
+            named(name, model): values
+            for name in fits
+            for model, values in (("fast model", fast[name]), ("full model", found[name][kind]))
         }
-        tables += _by_channel(displacements, moved, "sensor", "um")
+        return _by_channel(sources, differences, what, unit)
+
+    tables = [by_model, *by_channel("channels", found["differences"], "channel", "K")]
+    if moved := found.get("displacement_differences"):
+        tables += by_channel("displacements", moved, "sensor", "um")
     return tables
 
 
@@ -110,16 +123,18 @@ def _by_channel(
         *(fixed(f"{name} / {shown}", name, 3) for name in sources),
         fixed(f"noise / {shown}", f"noise_{unit}", 3),
     )
+    *_, last = sources.values()
     rows = [
         {**row, **{name: source[index][f"rmse_{unit}"] for name, source in sources.items()}}
-        for index, row in enumerate(sources["after, full model"])
+        for index, row in enumerate(last)
     ]
-    apart = (
-        *named,
+    before_and_after = (
         fixed(f"before / {shown}", f"before_{unit}", 3),
         fixed(f"after / {shown}", f"after_{unit}", 3),
         fixed(f"of what they differ by / {shown}", f"change_{unit}", 3),
     )
+    one = (fixed(f"difference / {shown}", f"after_{unit}", 3),)
+    apart = (*named, *(before_and_after if len(sources) > ONE_FIT else one))
     return [
         table_of(errors, rows, f"Root mean square error of each {what} over all its readings."),
         table_of(

@@ -20,7 +20,17 @@ from spindle_fem.report.diagnosis_words import (
     set_words,
 )
 from spindle_fem.report.parameter_words import parameter_words
-from spindle_fem.report.table_rows import Field, fixed, plain, rounded, significant, table_of, whole, words
+from spindle_fem.report.table_rows import (
+    Field,
+    fixed,
+    number,
+    plain,
+    rounded,
+    significant,
+    table_of,
+    whole,
+    words,
+)
 
 _DEFECTS = ("spikes", "dropouts", "stuck", "implausible", "bridged", "empty_cells", "infinite")
 _FROM_TO = (
@@ -90,7 +100,7 @@ def misdescription_blocks(content: Mapping[str, Any]) -> list[Table | Text]:
                 rounded("high", "high"),
                 words("unit", "unit"),
                 fixed("in widths of its prior", "sigmas", 1),
-                words("moves a channel by up to", _largest),
+                whole("moves a channel by up to", _largest),
                 words("channel", "channel"),
             )
             blocks.append(table_of(fields, deviations[key], caption))
@@ -263,8 +273,8 @@ def next_blocks(content: Mapping[str, Any]) -> list[Any]:
             words("operation", "condition"),
             fixed("information / bit", "expected_information", 2),
             words("clearest at", _clearest_channel),
-            words("difference", lambda option: _in_its_unit(option, "difference")),
-            words("± 1 σ", lambda option: _in_its_unit(option, "sigma")),
+            whole("difference", lambda option: _in_its_unit(option, "difference")),
+            whole("± 1 σ", lambda option: _in_its_unit(option, "sigma")),
             fixed("after / min", lambda option: option["after_s"] / 60.0, 0),
         )
         between = " and ".join(item.get("between", [])[:2])
@@ -287,8 +297,8 @@ def _largest(row: Mapping[str, Any]) -> str:
 def _in_its_unit(option: Mapping[str, Any], key: str) -> str:
     """A difference of temperatures, or of displacements."""
     if f"{key}_um" in option:
-        return f"{option[f'{key}_um']:.2f} µm"
-    return f"{option[f'{key}_K']:.2f} K"
+        return f"{number(option[f'{key}_um'], 2)} µm"
+    return f"{number(option[f'{key}_K'], 2)} K"
 
 
 def _clearest_channel(option: Mapping[str, Any]) -> str:

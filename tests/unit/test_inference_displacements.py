@@ -387,6 +387,7 @@ def test_the_full_model_checks_displacements_in_micrometres(heated, monkeypatch)
     warm, moved = channel_errors(predictor, fast), displacement_errors(predictor, fast)
     total = {"train_rmse_K": 1.0, "heldout_rmse_K": 1.0}
     content = {
+        "findings": [],
         "mismatch": {"channels": warm, "displacements": moved},
         "fit": {
             "before": total,
@@ -401,6 +402,10 @@ def test_the_full_model_checks_displacements_in_micrometres(heated, monkeypatch)
     words, *tables = section.blocks
     assert "µm apart" in words.text
     assert [table.rows[0]["cells"][0] for table in tables[1:]] == ["SP01", "SP01", "S1", "S1"]
+    # With nothing found there is one fit, of which each model has a column.
+    assert "before" not in words.text
+    assert [row["cells"][0] for row in tables[0].rows] == ["fast model", "full model", "noise"]
+    assert [c["title"] for c in tables[2].columns] == ["channel", "difference / K"]
     found.pop("displacement_differences")
     assert len(full_model_sections(content)[0].blocks) == 4
 
