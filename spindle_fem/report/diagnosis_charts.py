@@ -53,9 +53,11 @@ def residual_table(data: xr.Dataset, key: str) -> tuple[list[str], list[str], Ar
 
 @styled
 def residual_map(data: xr.Dataset) -> Figure:
-    """Root mean square residual, channel by condition, before beside after on one scale."""
+    """Root mean square residual, channel by condition, before beside after on one scale, or of one fit."""
     names, conditions, before = residual_table(data, "before")
-    after = residual_table(data, "after")[2]
+    panels = [(before, "before"), (residual_table(data, "after")[2], "after")]
+    if data["before"].equals(data["after"]):
+        panels = [(before, "")]
     noise = float(np.sqrt(np.nanmean(data["noise"].values ** 2)))
     bar = ColourBar(
         FILM_MAP.reversed(), 0.0, max(float(np.nanmax(before)), 2.0 * noise), "root mean square residual / K"
@@ -64,8 +66,8 @@ def residual_map(data: xr.Dataset) -> Figure:
     figure = new_figure(top + row_height * len(names) + foot)
     longest = max(len(name) for name in names)
     left = 60.0 + 13.2 * longest
-    width = 0.5 * (1600.0 - left - 30.0) - 15.0
-    for number, (values, title) in enumerate(((before, "before"), (after, "after"))):
+    width = (1600.0 - left) / len(panels) - 30.0
+    for number, (values, title) in enumerate(panels):
         axes = pixel_axes(figure, left + number * (width + 30.0), top, width, row_height * len(names))
         axes.imshow(values, cmap=bar.colour_map, norm=bar.norm, aspect="auto")
         axes.set_title(title)

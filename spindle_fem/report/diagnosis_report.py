@@ -43,6 +43,7 @@ from spindle_fem.report.diagnosis_words import (
     checks,
     confidence_words,
     found_words,
+    is_one_fit,
     place_named,
     sensors_named,
     verdict_sentence,
@@ -56,10 +57,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CAPTIONS = {
-    "before_after": "Readings, model before and after, and what each leaves; shaded: not fitted.",
-    "displacements": "Displacements as read, model before and after, and what each leaves, but for where "
-    "the sensor was set; shaded: not fitted.",
-    "residual_map": "Root mean square residual by channel and condition, before and after.",
+    "before_after": "Readings, the model, and what it leaves; shaded: not fitted.",
+    "displacements": "Displacements as read, the model, and what it leaves, but for where the sensor was "
+    "set; shaded: not fitted.",
+    "residual_map": "Root mean square residual by channel and condition.",
     "sets": "Probability of every set of effects that was fitted to the end. Misfit: root mean square of "
     "what it leaves of the readings, in widths of their noise and slow error.",
     "findings": "Parameters of the findings, with 90 % intervals.",
@@ -215,7 +216,7 @@ def render(content: Mapping[str, Any], pictures: Mapping[str, list[Any]]) -> str
         ),
         Section(
             "fit",
-            "Before and after",
+            "Readings and model" if is_one_fit(content["fit"]) else "Before and after",
             [
                 fit_table(content),
                 *of("before_after", "displacements", "residual_map"),

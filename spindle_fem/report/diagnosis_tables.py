@@ -13,6 +13,7 @@ from spindle_fem.report.diagnosis_words import (
     fit_rows,
     found_words,
     heldout_errors,
+    is_one_fit,
     kelvin,
     level,
     moment,
@@ -43,6 +44,8 @@ def cards(content: Mapping[str, Any]) -> Cards:
     """Headline numbers."""
     fit, mismatch = content["fit"], content["mismatch"]
     before, after, told = heldout_errors(fit)
+    error = kelvin(after) if is_one_fit(fit) else f"{kelvin(before)} → {kelvin(after)}"
+    change = "" if is_one_fit(fit) else ", before → after"
     items = [
         {"value": content["verdict"].replace("_", " "), "name": "verdict"},
         {"value": level(mismatch["p_value"]).removeprefix("= "), "name": "p, if nothing were missing"},
@@ -56,8 +59,8 @@ def cards(content: Mapping[str, Any]) -> Cards:
         )
     items += [
         {
-            "value": f"{kelvin(before)} → {kelvin(after)}",
-            "name": f"held-out error, before → after{f', {told}' if told else ''}",
+            "value": error,
+            "name": f"held-out error{change}{f', {told}' if told else ''}",
         },
         {"value": kelvin(fit["noise_K"]), "name": "noise of a reading"},
     ]
@@ -125,39 +128,31 @@ def recording_fields(items: Sequence[Mapping[str, Any]]) -> tuple[Field, ...]:
 
 def channel_table(content: Mapping[str, Any]) -> list[Table]:
     """Errors of every channel."""
-    before = content["mismatch"]["channels"]
-    after = content["fit"].get("channels_after") or [{}] * len(before)
-    items = [
-        {**first, "rmse_after": second.get("rmse_K"), "max_after": second.get("max_K")}
-        for first, second in zip(before, after, strict=True)
-    ]
-    fields = (
-        *recording_fields(before),
-        words("channel", "channel"),
-        fixed("before / K", "rmse_K", 3),
-        fixed("after / K", "rmse_after", 3),
-        fixed("noise / K", "noise_K", 3),
-        fixed("largest before / K", "max_K", 2),
-        fixed("largest after / K", "max_after", 2),
-    )
-    tables = [table_of(fields, items, "Root mean square and largest error of every channel.")]
-    if grown := content["mismatch"].get("displacements"):
-        after = content["fit"]["displacements_after"]
-        moved = [
-            {**first, "rmse_after": second["rmse_um"], "max_after": second["max_um"]}
-            for first, second in zip(grown, after, strict=True)
+    fit, mismatch = content["fit"], content["mismatch"]
+
+    def table(what: str, unit: str, before: list, after: list | None, caption: str) -> Table:
+        rms, most, shown = f"rmse_{unit}", f"max_{unit}", unit.replace("um", "µm")
+        items = [
+            {**first, "rmse_after": second.get(rms), "max_after": second.get(most)}
+            for first, second in zip(before, after or [{}] * len(before), strict=True)
         ]
-        fields = (
-            *recording_fields(grown),
-            words("sensor", "channel"),
-            fixed("before / µm", "rmse_um", 3),
-            fixed("after / µm", "rmse_after", 3),
-            fixed("noise / µm", "noise_um", 3),
-            fixed("largest before / µm", "max_um", 2),
-            fixed("largest after / µm", "max_after", 2),
+        noise = fixed(f"noise / {shown}", f"noise_{unit}", 3)
+        both = (
+            fixed(f"before / {shown}", rms, 3),
+            fixed(f"after / {shown}", "rmse_after", 3),
+            noise,
+            fixed(f"largest before / {shown}", most, 2),
+            fixed(f"largest after / {shown}", "max_after", 2),
         )
+        one = (fixed(f"error / {shown}", rms, 3), noise, fixed(f"largest / {shown}", most, 2))
+        fields = (*recording_fields(before), words(what, "channel"), *(one if is_one_fit(fit) else both))
+        return table_of(fields, items, caption)
+
+    caption = "Root mean square and largest error of every channel."
+    tables = [table("channel", "K", mismatch["channels"], fit.get("channels_after"), caption)]
+    if grown := mismatch.get("displacements"):
         caption = "Error of every displacement, but for where its sensor was set."
-        tables.append(table_of(fields, moved, caption))
+        tables.append(table("sensor", "um", grown, fit["displacements_after"], caption))
     return tables
 
 

@@ -212,15 +212,24 @@ def heldout_errors(fit: Mapping[str, Any]) -> tuple[float | None, float | None, 
     return fit["before"]["heldout_rmse_K"], told, "its moments told by all readings"
 
 
+def is_one_fit(fit: Mapping[str, Any]) -> bool:
+    """Whether nothing was found, so that before and after are the same."""
+    return all(fit["before"][key] == fit["after"][key] for key in ("train_rmse_K", "heldout_rmse_K"))
+
+
 def fit_rows(fit: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Errors before and after of fitted and held-out readings, K: ``model``, ``fitted``, ``heldout``."""
+    """Errors before and after of fitted and held-out readings, K: ``model``, ``fitted``, ``heldout``.
+
+    One of both where nothing was found.
+    """
+    names = {"after": "nothing missing"} if is_one_fit(fit) else {"before": "before", "after": "after"}
     rows = [
-        {"model": when, "fitted": fit[when]["train_rmse_K"], "heldout": fit[when]["heldout_rmse_K"]}
-        for when in ("before", "after")
+        {"model": name, "fitted": fit[when]["train_rmse_K"], "heldout": fit[when]["heldout_rmse_K"]}
+        for when, name in names.items()
     ]
     _, after, told = heldout_errors(fit)
     if told:
-        rows.append({"model": f"after, {told}", "fitted": None, "heldout": after})
+        rows.append({"model": f"{names['after']}, {told}", "fitted": None, "heldout": after})
     return rows
 
 

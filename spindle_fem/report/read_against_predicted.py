@@ -262,7 +262,7 @@ def before_after(data: xr.Dataset, number: int) -> Figure:
                 name,
                 item["time"].values,
                 np.where(item["usable"].values == 1, item["measured"].values, np.nan),
-                {"model before": item["before"].values, "model after": item["after"].values},
+                _predictions(item["before"].values, item["after"].values),
                 2.0 * float(item["noise"].values[number]),
                 item["held_out"].values == 1,
             )
@@ -289,7 +289,7 @@ def displaced_before_after(data: xr.Dataset, number: int) -> Figure | None:
                 str(name),
                 item["time"].values,
                 MICROMETRES * item["displacement"].values,
-                {"model before": MICROMETRES * before, "model after": MICROMETRES * after},
+                _predictions(MICROMETRES * before, MICROMETRES * after),
                 2.0 * MICROMETRES * float(item["displacement_noise"].values[number]),
                 item["held_out"].values == 1,
                 ("µm", "µm"),
@@ -302,10 +302,18 @@ def displaced_before_after(data: xr.Dataset, number: int) -> Figure | None:
 
 def _before_after_figure(courses: list[Course], read: str, data: xr.Dataset, number: int) -> Figure:
     named = f", {courses[0].name}" if len(courses) == 1 else ""
-    title = f"{data['recording'].values[number]}{named}: before and after"
+    what = "before and after" if len(courses[0].predictions) > 1 else "read and predicted"
+    title = f"{data['recording'].values[number]}{named}: {what}"
     notes = f"{read} above, residual (read − model, means over short times) beneath."
     start = str(data["start_stamp"].values[number]) or None
     return courses_figure(courses, title, notes, "noise, ± 2 σ of a reading", start)
+
+
+def _predictions(before: Array, after: Array) -> dict[str, Array]:
+    """Predictions by a key of ``LINES``: one where nothing was found."""
+    if np.array_equal(before, after, equal_nan=True):
+        return {"predicted": after}
+    return {"model before": before, "model after": after}
 
 
 def of_recording(data: xr.Dataset, number: int) -> xr.Dataset:

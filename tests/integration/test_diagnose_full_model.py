@@ -117,11 +117,10 @@ def test_the_full_model_confirms_what_was_found(tmp_path, monkeypatch):
     channels = [{"channel": name, "rmse_K": 2.5, "noise_K": 0.1} for name in PROBES]
     moved = [{"channel": "S1", "rmse_um": 1.0, "noise_um": 0.2}]
     content = {
-        "findings": [{}],
         "mismatch": {"channels": channels, "displacements": moved},
         "fit": {
             "before": fast,
-            "after": fast,
+            "after": {**fast, "heldout_rmse_K": 1.0},
             "noise_K": 0.1,
             "channels_after": channels,
             "displacements_after": moved,

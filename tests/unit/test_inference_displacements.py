@@ -387,7 +387,6 @@ def test_the_full_model_checks_displacements_in_micrometres(heated, monkeypatch)
     warm, moved = channel_errors(predictor, fast), displacement_errors(predictor, fast)
     total = {"train_rmse_K": 1.0, "heldout_rmse_K": 1.0}
     content = {
-        "findings": [],
         "mismatch": {"channels": warm, "displacements": moved},
         "fit": {
             "before": total,

@@ -125,12 +125,25 @@ def test_errors_are_told_beside_the_noise_and_by_no_second_measure():
     assert "noise" not in str(table.columns).lower()
 
 
+def test_where_nothing_was_found_errors_are_not_told_twice():
+    told = content("consistent") | {"findings": []}
+    told["mismatch"]["channels"] = [{"channel": "SP01", "rmse_K": 0.07, "noise_K": 0.04, "max_K": 0.2}]
+    told["fit"]["before"] = told["fit"]["after"]
+    assert [row["cells"] for row in fit_table(told).rows] == [["nothing missing", "0.186", "0.243"]]
+    assert {"value": "0.24 K", "name": "held-out error"} in cards(told).items
+    assert [c["title"] for c in channel_table(told)[0].columns] == [
+        "channel",
+        "error / K",
+        "noise / K",
+        "largest / K",
+    ]
+
+
 def test_the_report_tells_of_displacements_in_micrometres():
     error = {"channel": "S1", "rmse_um": 1.5, "noise_um": 0.1, "max_um": 4.0}
-    told = {
-        "mismatch": {"channels": [], "displacements": [error]},
-        "fit": {"channels_after": [], "displacements_after": [error | {"rmse_um": 0.2, "max_um": 0.5}]},
-    }
+    fit = {"channels_after": [], "displacements_after": [error | {"rmse_um": 0.2, "max_um": 0.5}]}
+    errors = {when: content("missing_physics")["fit"][when] for when in ("before", "after")}
+    told = {"mismatch": {"channels": [], "displacements": [error]}, "fit": fit | errors}
     _, grown = channel_table(told)
     assert "before / µm" in str(grown.columns)
     assert "0.200" in str(grown.rows)
