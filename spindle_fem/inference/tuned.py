@@ -204,8 +204,8 @@ CHANCE_DIVISOR, CANDIDATES_A_TRIAL = 2.2, 64.0
 SMALLEST_SIZE, SEEN_FROM = 0.01, 2.0
 # Odds of a set of a machine with geometry over the one without one of its effects that it needs; where that
 # effect is at the place of another of the set, whose law leaves what it fits. (Of 396 cases of seeds 541, 557
-# and 563 of generate_rough 334 are named first at 20 and at 50, 336 with the second from 500 on.)
-FURTHER_EFFECT, FURTHER_AT_ITS_PLACE = 50.0, 5000.0
+# and 563 of generate_rough 334 are named first at 20 and at 50, 336 with the second from 500 to 5000.)
+FURTHER_EFFECT, FURTHER_AT_ITS_PLACE = 50.0, 500.0
 # A set of a network whose error on held-out readings is this many times that of some of its effects alone is
 # given up.
 WORSE_HELDOUT = 1.05
