@@ -246,7 +246,7 @@ def print_simulation(content: dict[str, Any], folder: Path) -> None:
 
 def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
     """Verdict, findings, alternatives and the fit before and after."""
-    from spindle_fem.report.diagnosis_words import fit_rows, level
+    from spindle_fem.report.diagnosis_words import fit_rows, fits_told, level
 
     console = open_console()
     mismatch, fit = content["mismatch"], content["fit"]
@@ -267,8 +267,8 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
         for row in fit_rows(fit):
             table.add_row(row["model"], _number(row["fitted"], 3), _number(row["heldout"], 3))
         full = fit["full_model"]
-        for name in ("before", "after") if full["reason"] is None else ():
-            errors = (full[name]["train_rmse_K"], full[name]["heldout_rmse_K"])
+        for when, name in fits_told(fit).items() if full["reason"] is None else ():
+            errors = (full[when]["train_rmse_K"], full[when]["heldout_rmse_K"])
             table.add_row(f"{name}, full model", *(_number(error, 3) for error in errors))
         table.add_row("noise", _number(fit["noise_K"], 3), _number(fit["noise_K"], 3))
         console.print(table)

@@ -7,7 +7,7 @@ from typing import Any
 
 from spindle_fem.report.block_page import Notice, Section, Table, Text
 from spindle_fem.report.diagnosis_tables import recording_fields
-from spindle_fem.report.diagnosis_words import is_one_fit
+from spindle_fem.report.diagnosis_words import fits_told
 from spindle_fem.report.table_rows import fixed, table_of, words
 
 # Sources of errors where there is one fit: both models.
@@ -30,8 +30,7 @@ def full_model_sections(content: Mapping[str, Any]) -> list[Section]:
         return []
     if found["reason"] is not None:
         return [Section("full_model", "The full model", [Notice(found["reason"])])]
-    # Where nothing was found there is one fit.
-    fits = ("after",) if is_one_fit(content["fit"]) else ("before", "after")
+    fits = list(fits_told(content["fit"]))
     title = f"The full model{', before and after' if len(fits) > 1 else ''}"
     return [Section("full_model", title, [Text(_words(found, fits)), *_tables(content, found, fits)])]
 

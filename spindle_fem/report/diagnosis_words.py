@@ -217,12 +217,14 @@ def is_one_fit(fit: Mapping[str, Any]) -> bool:
     return all(fit["before"][key] == fit["after"][key] for key in ("train_rmse_K", "heldout_rmse_K"))
 
 
-def fit_rows(fit: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Errors before and after of fitted and held-out readings, K: ``model``, ``fitted``, ``heldout``.
+def fits_told(fit: Mapping[str, Any]) -> dict[str, str]:
+    """Words for ``before`` and ``after``; for one of both where nothing was found."""
+    return {"after": "nothing missing"} if is_one_fit(fit) else {"before": "before", "after": "after"}
 
-    One of both where nothing was found.
-    """
-    names = {"after": "nothing missing"} if is_one_fit(fit) else {"before": "before", "after": "after"}
+
+def fit_rows(fit: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Errors of every fit on fitted and held-out readings, K: ``model``, ``fitted``, ``heldout``."""
+    names = fits_told(fit)
     rows = [
         {"model": name, "fitted": fit[when]["train_rmse_K"], "heldout": fit[when]["heldout_rmse_K"]}
         for when, name in names.items()
