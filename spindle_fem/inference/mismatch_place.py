@@ -221,7 +221,7 @@ def component_shares(
     ...          (("left", 4.0), ("right", 0.0), ("top", 0.0))]
     >>> shares, spots = component_shares(items, {"right": "rest", "top": "rest"})
     >>> {name: round(value, 2) for name, value in shares.items()}, spots["rest"]
-    ({'left': 0.79, 'rest': 0.21}, 'right')
+    ({'left': 0.88, 'rest': 0.12}, 'right')
     """
     evidence: dict[str, float] = {}
     for item in explanations:
