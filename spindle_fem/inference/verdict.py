@@ -243,9 +243,12 @@ def _not_named(sets: _Weighed, asked: _Asked) -> Judgement:
     impossible = asked.coarseness == 1.0 and bool(chosen.fit.candidates) and sets.p_value < tuned.RULED_OUT
     if not (much_left or (impossible and more_left)) or (left <= tuned.MOST_LEFT and in_prior):
         _, others = as_one([empty, *(i for i in kept if i.fit.candidates)], asked.overlapping)
-        # What is less likely than nothing missing, but not ruled out.
-        listed = tuple(i for i in others if tuned.LISTED <= i.probability < empty.probability)
-        return Judgement("consistent", sets.p_value, empty, listed, 0.0, "")
+        # Where chance leaves readings like these nothing missing is as likely as not, whatever evidence says.
+        nothing = max(empty.probability, tuned.STILL_POSSIBLE)
+        share = (1.0 - nothing) / max(1.0 - empty.probability, np.finfo(float).tiny)
+        rivals = (replace(i, probability=share * i.probability) for i in others)
+        listed = tuple(i for i in rivals if i.probability >= tuned.LISTED)
+        return Judgement("consistent", sets.p_value, replace(empty, probability=nothing), listed, 0.0, "")
     # The residual is there, and no set of the catalogue makes it likelier.
     p_value, reason = sets.p_value, CONTRADICTED_REASON
     if much_left:

@@ -134,6 +134,19 @@ def test_nothing_missing_is_consistent():
     assert found.other == 0.0
 
 
+def test_what_chance_leaves_is_consistent_with_a_half_at_least_and_likelier_sets_beside_it():
+    nothing, found = hypothesis(misfit=1000.0), hypothesis(PRELOAD, misfit=980.0)
+    likelier, empty = rank([nothing, found])
+    assert likelier.fit is found.fit
+    assert empty.probability < 0.5
+    told = verdict(nothing, found, trials=1000)
+    assert told.p_value > tuned.SIGNIFICANT
+    assert (told.verdict, told.chosen.probability) == ("consistent", tuned.STILL_POSSIBLE)
+    (other,) = told.alternatives
+    assert other.fit is found.fit
+    assert other.probability == pytest.approx(1.0 - tuned.STILL_POSSIBLE)
+
+
 def test_complexity_alone_does_not_make_an_impossible_recording_consistent():
     dear, none = candidate("grease_churning"), hypothesis(misfit=460.0, log_prior=-0.5)
     # The dear set pays more for its parameters than it gains, tempered: probably nothing, were it possible.
