@@ -13,6 +13,7 @@ from spindle_fem.inference.hypothesis import Hypothesis, identity
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import LARGEST_SET, Search, Task
 from spindle_fem.inference.input_sampling import left_over_noise
+from spindle_fem.inference.misdescription import EVERY_CHANNEL
 from spindle_fem.inference.neighbouring_sets import exchanged, reduced, sought_again, widened
 from spindle_fem.inference.state_search import add_states, settle_best
 from spindle_fem.inference.step_search import add_steps
@@ -91,6 +92,7 @@ def _far_off(search: Search, fit: Fit) -> list[Task]:
     """A set with effects that make a channel late, where its fit takes a large one for a small error.
 
     To first order what it has of the error is as good as the effect, so that a screening does not show it.
+    Where that makes channels early, all others are tried as the only one that is late.
     An effect that lowered nothing beside nothing missing is not tried again beside others.
     """
     values, nothing = fit.values, search.found[identity(())].fit.misfit_with_prior
@@ -99,14 +101,18 @@ def _far_off(search: Search, fit: Fit) -> list[Task]:
         alone = search.found.get(identity((candidate,)))
         return alone is None or alone.fit.misfit_with_prior < nothing
 
-    late = [
-        (item, values[item.coordinate])
-        for item in search.problem.predictor.misdescribed
-        if item.delays and abs(values.get(item.coordinate, 0.0)) > tuned.FAR_OFF * item.sigma
-    ]
+    delayed = [(i, values.get(i.coordinate, 0.0)) for i in search.problem.predictor.misdescribed if i.delays]
+    off = [(item, seconds) for item, seconds in delayed if abs(seconds) > tuned.FAR_OFF * item.sigma]
+    early = [seconds for item, seconds in off if seconds < 0.0 and item.delays != EVERY_CHANNEL]
+    begun = [(item, seconds, {item.coordinate: 0.0}) for item, seconds in off]
+    if early:
+        # No sensor shows what is to come: where channels seem early it may be another one that is late.
+        on_time = {item.coordinate: 0.0 for item, _ in delayed}
+        rest = [(item, seconds) for item, seconds in delayed if (item, seconds) not in off]
+        begun += [(item, seconds - float(np.median(early)), on_time) for item, seconds in rest]
     return [
-        ((*fit.candidates, candidate), values | {item.coordinate: 0.0, candidate.amplitude: seconds})
-        for item, seconds in late
+        ((*fit.candidates, candidate), values | on_time | {candidate.amplitude: seconds})
+        for item, seconds, on_time in begun
         for candidate in search.delaying(item.delays, seconds)
         if candidate not in fit.candidates and lowers(candidate)
     ]

@@ -176,6 +176,7 @@ def test_what_rows_and_gaps_leave_open_is_not_worked_out_for_moved_faces(case, m
     [(1.1, {"clock_shift", "sensor_lag"}), (-1.1, {"clock_shift"}), (0.9, set())],
 )
 def test_a_large_delay_of_a_sensor_is_tried_as_its_effects(case, seconds, tried):
+    """Of ``SP02`` alone; that it is early makes nobody late where no other delay is open."""
     plain = Predictor(case.fast, [case.blank])
     late = next(i for i in misdescriptions_of(plain) if i.name == "response.SP02")
     predictor = with_misdescriptions(plain, [late])
@@ -206,3 +207,23 @@ def test_a_large_delay_of_a_sensor_is_tried_as_its_effects(case, seconds, tried)
     fit = problem.fit((beside,), {late.coordinate: value}, iterations=0)
     fit.position[[c.name for c in fit.coordinates].index(late.coordinate)] = value / late.sigma
     assert search_course._far_off(search, fit) == []
+
+
+@pytest.mark.parametrize(("way", "tried"), [(-1.0, {"SP01", "SP02"}), (1.0, {"SP02"})])
+def test_where_a_channel_seems_early_another_is_tried_as_late(case, way, tried):
+    plain = Predictor(case.fast, [case.blank])
+    delays = [i for i in misdescriptions_of(plain) if i.name in ("response.SP01", "response.SP02")]
+    predictor = with_misdescriptions(plain, delays)
+    problem = Problem(predictor, calibrate(None, predictor).known, EXPECTED_SLOW, predictor.observations)
+    seconds = {"SP01": 3.0, "SP02": way * 1.1 * tuned.FAR_OFF * tuned.RESPONSE_SIGMA}
+    null = problem.fit((), {i.coordinate: seconds[i.delays] for i in delays}, iterations=0)
+    search = SimpleNamespace(problem=problem, candidates=candidates_for(case.view), effects=catalogue())
+    search.delaying = partial(Search.delaying, search)
+    search.found = {identity(()): SimpleNamespace(fit=null)}
+    tasks = search_course._far_off(search, null)
+    assert {member.component for (member,), _ in tasks} == tried
+    for (member,), start in tasks:
+        if member.component == "SP01":
+            # By as much as lies between both, and the other one on time.
+            assert start[member.amplitude] == pytest.approx(3.0 - seconds["SP02"])
+            assert [start[i.coordinate] for i in delays] == [0.0, 0.0]
