@@ -243,9 +243,10 @@ def _not_named(sets: _Weighed, asked: _Asked) -> Judgement:
     impossible = asked.coarseness == 1.0 and bool(chosen.fit.candidates) and sets.p_value < tuned.RULED_OUT
     if not (much_left or (impossible and more_left)) or (left <= tuned.MOST_LEFT and in_prior):
         _, others = as_one([empty, *(i for i in kept if i.fit.candidates)], asked.overlapping)
-        # Where chance leaves readings like these nothing missing is as likely as not, whatever evidence says.
+        # What chance or the prior holds is as likely as not, whatever evidence says; sets share the rest.
         nothing = max(empty.probability, tuned.STILL_POSSIBLE)
-        share = (1.0 - nothing) / max(1.0 - empty.probability, np.finfo(float).tiny)
+        rest = sum(i.probability for i in others)
+        share = min(1.0, (1.0 - nothing) / max(rest, np.finfo(float).tiny))
         rivals = (replace(i, probability=share * i.probability) for i in others)
         listed = tuple(i for i in rivals if i.probability >= tuned.LISTED)
         return Judgement("consistent", sets.p_value, replace(empty, probability=nothing), listed, 0.0, "")

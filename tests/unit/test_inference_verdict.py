@@ -342,6 +342,12 @@ def test_a_shift_that_the_prior_holds_is_consistent():
     held = hypothesis(SCALE, misfit=400.0, position=(1.0, 1.2 * 0.2 / own_sigma))
     assert within_prior(held.fit, calibrated=False)
     assert verdict(hypothesis(misfit=460.0), held).verdict == "consistent"
+    # It stands beside nothing missing, and both share the whole, whatever a p-value rules out.
+    for before in (410.0, 425.0, 430.0, 460.0):
+        told = verdict(hypothesis(misfit=before), held, trials=0)
+        assert told.verdict == "consistent"
+        stated = [told.chosen.probability, *(i.probability for i in told.alternatives)]
+        assert sum(stated) <= 1.0 + 1e-12
     beyond = hypothesis(SCALE, misfit=400.0, position=(1.0, 2.0 * 0.2 / own_sigma))
     assert not within_prior(beyond.fit, calibrated=False)
     assert verdict(hypothesis(misfit=460.0), beyond).verdict == "parameter"
