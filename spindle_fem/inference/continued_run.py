@@ -16,6 +16,7 @@ from spindle_fem.inference.heat_misdescriptions import clock_change
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import direction_columns, misdescriptions_of
 from spindle_fem.inference.observations import Observation, observe
+from spindle_fem.inference.open_events import carried_on, nothing_open
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.predictor import STEP, Predictor
 from spindle_fem.inference.structural_misdescriptions import StructuralChange, model_with_directions
@@ -57,6 +58,12 @@ class _Piece(Predictor):
     ) -> None:
         self._begun = begun
         super().__init__(fast, [piece], effects=effects, drives=[_drive_of(fast, piece)])
+
+    def changes_by_open(self, base: BaseRun, begun: Array) -> tuple[Array, Array]:
+        """Changes by what rows and gaps leave open, as :func:`carried_on` gives them; none of a network."""
+        if self.is_network:
+            return np.zeros((self.drives[0].grid.size, base.channels, 1)), begun
+        return carried_on(base, begun, self.unread_jumps[0], self._hidden[0])
 
     def start(
         self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
@@ -112,6 +119,8 @@ class ContinuedRun:
         # Derivatives of the state to directions of misdescription, which it does not follow itself.
         self._directions: dict[str, Array] = {}
         self._structural: tuple[Array, Mapping[str, Array]] | None = None
+        # What rows and gaps left open does to it.
+        self._open = nothing_open(self.fast.model.size)
         self._run: TransientRun | None = None
 
     def begins(self, piece: Recording) -> Predictor:
@@ -130,8 +139,10 @@ class ContinuedRun:
 
     def follow(
         self, piece: Recording, values: Mapping[str, float], names: Sequence[str], width: float
-    ) -> tuple[Prediction, tuple[Observation, ...]]:
+    ) -> tuple[Prediction, tuple[Observation, ...], Array]:
         """Follow a further piece, whose first row is the last one of the piece before.
+
+        An input that is another in its last row alone changed unnoticed: the next piece begins with it.
 
         Parameters
         ----------
@@ -147,18 +158,26 @@ class ContinuedRun:
         Prediction
         tuple of Observation
             Averages of the readings after the first row.
+        (G + 1, c, e) ndarray, [K]
+            Changes of the channels by a standard deviation of whatever rows and gaps left open since the
+            start: that of this piece last, but for what was forgotten.
         """
         predictor = _Piece(self.fast, piece, self.effects, self.begun)
         predicted = predictor.at_places(0, values, (), names)
+        base = BaseRun(predictor, 0, values)
         self.begun, self._run = _end_of(predicted, names), predicted.run
-        self._misdescribed(predictor, values, names).pass_on(0, predicted, values, (), names)
+        self._misdescribed(predictor, base, names).pass_on(0, predicted, values, (), names)
+        opened, self._open = predictor.changes_by_open(base, self._open)
+        predicted.temperature[:] += opened[:, :, 0]
         fresh = np.ones(piece.times.size, dtype=bool)
         fresh[0] = False
-        return predicted, observe([piece], [fresh], [predictor.drives[0].grid], [width])
+        return predicted, observe([piece], [fresh], [predictor.drives[0].grid], [width]), opened[:, :, 1:]
 
-    def _misdescribed(
-        self, predictor: Predictor, values: Mapping[str, float], names: Sequence[str]
-    ) -> Predictor:
+    def forget_open(self, number: int) -> None:
+        """Drop the oldest of what rows and gaps left open: it has faded."""
+        self._open = np.delete(self._open, slice(1, 1 + number), axis=1)
+
+    def _misdescribed(self, predictor: _Piece, base: BaseRun, names: Sequence[str]) -> Predictor:
         """The piece with what directions of misdescription do, those of earlier pieces carried on."""
         asked = [item for item in misdescriptions_of(predictor) if item.coordinate in names]
         structural = [item for item in asked if isinstance(item.change, StructuralChange)]
@@ -167,13 +186,12 @@ class ContinuedRun:
             # Their model carries them in its own state.
             model, own = model_with_directions(self.fast), [item.change.name for item in structural]
             beside = _Piece(model, predictor.recordings[0], self.effects, self._structural)
-            differs = beside.at_places(0, values, (), own)
+            differs = beside.at_places(0, base.values, (), own)
             self._structural = _end_of(differs, own)
             amounts = np.array([item.change.amount for item in structural])
             columns |= _by_coordinate(structural, differs.sensitivity * amounts)
         directions = [item for item in asked if not isinstance(item.change, StructuralChange)]
         if directions:
-            base = BaseRun(predictor, 0, values)
             channels, states = direction_columns(base, directions)
             if self._directions:
                 start = np.column_stack([self._directions[item.coordinate] for item in directions])

@@ -35,7 +35,7 @@ SETTLING, SHORT_STEP, SMALL_CHANGE = 120.0, 20.0, 0.02
 
 def _centred(fine: Drive, recording: Recording) -> Drive:
     """The drive with changes that fell into gaps put amid them instead of at their ends."""
-    usual = float(np.median(np.diff(recording.times)))
+    usual = recording.usual_spacing
     held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
     columns = [i for i, name in enumerate(fine.names) if held.get(name, False)]
     start, end = fine.start.copy(), fine.end.copy()

@@ -1,10 +1,10 @@
 """Information of readings beyond those before them: a Kalman filter over parameters and slow errors.
 
-Unknown are the machine's coordinates (in units of their priors), one slow error per channel and the zero of
-every displacement sensor. A reading is the prediction, plus its derivatives times the departure of the
-coordinates, plus the slow error, plus white noise, of a displacement plus the zero. As long as the machine is
-as its model and the noise as stated, the differences between readings and what those before them lead to
-expect are independent from instant to instant, of known spread.
+Unknown are the machine's coordinates (in units of their priors), what rows and gaps leave open, one slow
+error per channel and the zero of every displacement sensor. A reading is the prediction, plus its derivatives
+times the departure of the first two, plus the slow error, plus white noise, of a displacement plus the zero.
+As long as the machine is as its model and the noise as stated, the differences between readings and what
+those before them lead to expect are independent from instant to instant, of known spread.
 
 Source: Anderson & Moore (1979), Optimal Filtering, chapters 3 and 5.
 """
@@ -39,9 +39,11 @@ class InnovationFilter:
 
     Attributes
     ----------
-    mean : (p + c + d,) ndarray
-        Departures of the coordinates, then slow errors [K, µm], then zeros [µm].
-    covariance : (p + c + d, p + c + d) ndarray
+    mean : (p + e + c + d,) ndarray
+        Departures of the coordinates, then of what is open, slow errors [K, µm], zeros [µm].
+    covariance : (p + e + c + d, p + e + c + d) ndarray
+    open : int
+        Number e of what rows and gaps left open.
     slow_sigma : (c,) ndarray, [K, µm]
         Usual size of the slow errors.
     """
@@ -49,8 +51,8 @@ class InnovationFilter:
     def __init__(self, covariance: Array, slow: Sequence[SlowError], relative: Sequence[int] = ()) -> None:
         self.slow_sigma = np.array([item.sigma for item in slow])
         self._time = np.array([item.time for item in slow])
-        self._errors = slice(len(covariance), len(covariance) + len(slow))
-        self._zero = {channel: self._errors.stop + place for place, channel in enumerate(relative)}
+        self._own, self.open = len(covariance), 0
+        self._zero = {channel: place for place, channel in enumerate(relative)}
         self._known = np.array([channel not in self._zero for channel in range(len(slow))])
         variances = np.concatenate((self.slow_sigma**2, np.full(len(relative), ZERO_SIGMA**2)))
         size = len(covariance) + len(variances)
@@ -58,6 +60,28 @@ class InnovationFilter:
         self.covariance = np.zeros((size, size))
         self.covariance[: len(covariance), : len(covariance)] = covariance
         self.covariance[len(covariance) :, len(covariance) :] = np.diag(variances)
+
+    @property
+    def _errors(self) -> slice:
+        first = self._own + self.open
+        return slice(first, first + len(self.slow_sigma))
+
+    def open_further(self, number: int) -> None:
+        """Begin with further numbers that rows and gaps leave open, each of unit variance."""
+        first = self._errors.start
+        self.mean = np.insert(self.mean, [first] * number, 0.0)
+        for axis in (0, 1):
+            self.covariance = np.insert(self.covariance, [first] * number, 0.0, axis=axis)
+        fresh = np.arange(first, first + number)
+        self.covariance[fresh, fresh] = 1.0
+        self.open += number
+
+    def forget_open(self, number: int) -> None:
+        """Drop the oldest numbers that are open: what they did has faded."""
+        gone = slice(self._own, self._own + number)
+        self.mean = np.delete(self.mean, gone)
+        self.covariance = np.delete(np.delete(self.covariance, gone, axis=0), gone, axis=1)
+        self.open -= number
 
     @property
     def slow_errors(self) -> Array:
@@ -69,7 +93,7 @@ class InnovationFilter:
         """Estimated zero of every channel, (c,) µm; nothing for temperatures."""
         found = np.zeros(len(self._known))
         for channel, place in self._zero.items():
-            found[channel] = self.mean[place]
+            found[channel] = self.mean[self._errors.stop + place]
         return found
 
     def step(self, elapsed: float, residual: Array, slopes: Array, white: Array, *, learn: bool) -> Array:
@@ -81,8 +105,8 @@ class InnovationFilter:
             Since the instant before.
         residual : (c,) ndarray, [K, µm]
             Read less predicted; NaN where nothing was read.
-        slopes : (c, p) ndarray, [K, µm]
-            Derivatives of the prediction to the coordinates.
+        slopes : (c, p + e) ndarray, [K, µm]
+            Derivatives of the prediction to the coordinates, and to what is open.
         white : (c,) ndarray, [K, µm]
             Standard deviation of the white noise.
         learn : bool
@@ -93,7 +117,7 @@ class InnovationFilter:
         (c,) ndarray
             Innovations over their standard deviations; NaN where nothing was read, or only a zero set.
         """
-        own, errors, kept = self._errors.start, self._errors, np.exp(-elapsed / self._time)
+        errors, kept = self._errors, np.exp(-elapsed / self._time)
         self.mean[errors] *= kept
         self.covariance[errors] *= kept[:, None]
         self.covariance[:, errors] *= kept
@@ -104,14 +128,15 @@ class InnovationFilter:
         if not read.size:
             return scaled
         observes = np.zeros((read.size, len(self.mean)))
-        observes[:, :own] = slopes[read]
-        observes[np.arange(read.size), own + read] = 1.0
+        observes[:, : errors.start] = slopes[read]
+        observes[np.arange(read.size), errors.start + read] = 1.0
         fresh = ~self._known[read]
         for row, channel in enumerate(read.tolist()):
             if channel in self._zero:
+                zero = errors.stop + self._zero[channel]
                 if fresh[row]:
-                    self.mean[self._zero[channel]] = residual[channel] - observes[row] @ self.mean
-                observes[row, self._zero[channel]] = 1.0
+                    self.mean[zero] = residual[channel] - observes[row] @ self.mean
+                observes[row, zero] = 1.0
         self._known[read] = True
         noise = np.diag(white[read] ** 2)
         across = self.covariance @ observes.T
@@ -121,7 +146,7 @@ class InnovationFilter:
         scaled[read] = np.where(fresh, np.nan, innovation / sigma)
         gain = np.linalg.solve(spread, across.T).T
         if not learn:
-            gain[:own] = 0.0
+            gain[: self._own] = 0.0
         self.mean += gain @ np.clip(innovation, -OUTLIER * sigma, OUTLIER * sigma)
         left = np.eye(len(self.mean)) - gain @ observes
         self.covariance = left @ self.covariance @ left.T + gain @ noise @ gain.T
@@ -129,7 +154,6 @@ class InnovationFilter:
 
     def moved(self) -> Array:
         """Departures of the coordinates, (p,), which count from there afterwards."""
-        own = self._errors.start
-        found = self.mean[:own].copy()
-        self.mean[:own] = 0.0
+        found = self.mean[: self._own].copy()
+        self.mean[: self._own] = 0.0
         return found

@@ -33,7 +33,9 @@ TIMES = 4
 def gap_pieces(recording: Recording) -> tuple[tuple[float, float], ...]:
     """Gaps long enough for something to have happened in them, in pieces of some minutes, [s]."""
     spacing = np.diff(recording.times)
-    rows = np.flatnonzero((spacing > GAP_STEPS * np.median(spacing)) & (spacing >= tuned.SHORTEST_GAP))
+    rows = np.flatnonzero(
+        (spacing > GAP_STEPS * recording.usual_spacing) & (spacing >= tuned.SHORTEST_GAP)
+    )
     found = []
     for row in rows:
         first, last = recording.times[row : row + 2]
@@ -46,8 +48,7 @@ def gap_pieces(recording: Recording) -> tuple[tuple[float, float], ...]:
 
 def long_spacings(recording: Recording) -> tuple[tuple[float, float], ...]:
     """Distances of stamps within a segment that are gaps, whatever their length, [s]."""
-    spacing = np.diff(recording.times)
-    rows = np.flatnonzero(spacing > GAP_STEPS * np.median(spacing))
+    rows = np.flatnonzero(np.diff(recording.times) > GAP_STEPS * recording.usual_spacing)
     begins = set(recording.segments[1:, 0].tolist())
     return tuple(
         (float(recording.times[i]), float(recording.times[i + 1])) for i in rows if i + 1 not in begins
@@ -60,7 +61,7 @@ def with_changes_amid(recording: Recording) -> Recording:
     An input may be read more rarely than the temperatures beside it: held until its next reading every change
     would come late. Between which readings each was is kept in ``unseen_changes``.
     """
-    usual = float(np.median(np.diff(recording.times)))
+    usual = recording.usual_spacing
     begins = recording.times[recording.segments[1:, 0]]
     inputs, found = recording.inputs.copy(), []
     for column in np.flatnonzero(recording.held):
@@ -140,7 +141,7 @@ def spread_within(recording: Recording, begin: float, end: float) -> float:
     length, amid = times[row] - times[row - 1], 0.5 * (begin + end) - times[row - 1]
     starts = times[times + length <= times[-1]]
     # Windows with a gap of their own know nothing of it.
-    gaps = times[:-1][np.diff(times) > GAP_STEPS * np.median(np.diff(times))]
+    gaps = times[:-1][np.diff(times) > GAP_STEPS * recording.usual_spacing]
     starts = starts[np.searchsorted(gaps, starts) == np.searchsorted(gaps, starts + length)]
     if not starts.size:
         return 0.0
@@ -154,7 +155,7 @@ def _between_rows(recording: Recording, name: str) -> list[Hidden]:
     """Where an input temperature changes much from row to row it need not have gone along a straight line."""
     spacing = np.diff(recording.times)
     change = np.diff(recording.input_at(name, recording.times))
-    near = (spacing >= tuned.LEAST_SPACING) & (spacing <= GAP_STEPS * np.median(spacing))
+    near = (spacing >= tuned.LEAST_SPACING) & (spacing <= GAP_STEPS * recording.usual_spacing)
     rows = np.flatnonzero(near & (np.abs(change) >= tuned.LEAST_CHANGE))
     largest = np.sort(rows[np.argsort(-np.abs(change[rows]))[: tuned.MOST_BETWEEN]])
     return [
@@ -174,7 +175,7 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
         Step at whose start each is put; how much earlier [s], least and most,
         it may have been: in a gap up to half of it either way.
     """
-    usual = float(np.median(np.diff(recording.times)))
+    usual = recording.usual_spacing
     largest = np.ptp(drive.start, axis=0)
     found = []
     for step in 1 + np.flatnonzero(np.any(drive.start[1:] != drive.end[:-1], axis=1)):
@@ -209,7 +210,7 @@ def about_rows_amid(
     three lists of int
         Those that begin a change over several rows, that go on with it and that end it.
     """
-    usual = float(np.median(np.diff(recording.times)))
+    usual = recording.usual_spacing
     goes_on = [False]
     for (first, begins, _), (second, ends, _) in itertools.pairwise(jumps):
         changes = [drive.start[step] - drive.end[step - 1] for step in (first, second)]

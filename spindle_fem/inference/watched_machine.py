@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,10 @@ FADED = 3.0
 PIECE_INSTANTS = 60
 # Coordinates of the recording itself that are followed: temperatures at its start, its clocks.
 _OWN_HERE = (START_PREFIX, MISDESCRIBED_IN_PREFIX)
+# Moments and events that rows and gaps leave open, of some hours of work: what earlier ones did faded.
+MOST_OPEN = 60
+# Rows whose inputs differ by more than this share of the largest are amid a change, which a piece does not end.
+CHANGED = 0.02
 # Innovations by which the spread is judged, at most.
 MOST_NUMBERS = 20_000
 # Instants by which heating and cooling are distinguished.
@@ -166,7 +170,8 @@ class WatchedMachine:
         """
         self.used = float(piece.times[-1])
         self._begin(piece)
-        self.run.follow(piece, self._values, [c.name for c in self.coordinates], self.width)
+        *_, opened = self.run.follow(piece, self._values, [c.name for c in self.coordinates], self.width)
+        self._filter.open_further(opened.shape[2])
 
     def follow(self, recording: Recording, *, to_end: bool = False) -> list[Judgement]:
         """Follow the rows of a recording that are new, as far as whole averages go.
@@ -207,13 +212,21 @@ class WatchedMachine:
             wide = np.flatnonzero(np.diff(times[begin:stop]) > gap)
             if wide.size:
                 stop = begin + 1 + int(wide[0])
+            elif self.run.fast.network is None:
+                stop = _past_changes(recording, stop)
+                if stop > times.size:
+                    if not to_end:
+                        return found
+                    stop = times.size
             found += self._piece(piece_of(recording, begin, stop))
             self.used = float(times[stop - 1])
 
     def _piece(self, piece: Recording) -> list[Judgement]:
         names = [c.name for c in self.coordinates]
-        predicted, observations = self.run.follow(piece, self._values, names, self.width)
-        sigma = np.array([c.sigma for c in self.coordinates])
+        predicted, observations, opened = self.run.follow(piece, self._values, names, self.width)
+        self._filter.open_further(opened.shape[2] - self._filter.open)
+        predicted = replace(predicted, sensitivity=np.concatenate((predicted.sensitivity, opened), axis=2))
+        sigma = np.array([*(c.sigma for c in self.coordinates), *([1.0] * opened.shape[2])])
         instants = _Instants.of(piece, observations, predicted, sigma, self.width)
         self._channels = piece.temperature_names
         if np.diff(piece.times).max() > self._gap:
@@ -242,6 +255,9 @@ class WatchedMachine:
             self._away = np.where(read, instants.residual[index] - self._filter.zeros, self._away)
             found.append(self._judge(time, words[index]))
         self._recentre(float(piece.times[-1] - piece.times[0]))
+        faded = max(0, self._filter.open - MOST_OPEN)
+        self.run.forget_open(faded)
+        self._filter.forget_open(faded)
         return found
 
     def _judge(self, time: float, condition: str) -> Judgement:
@@ -283,6 +299,21 @@ class WatchedMachine:
         covariance[:, :own] *= kept
         covariance[:own, :own] += (1.0 - kept**2) * self._prior
         self._covariance = covariance[: len(self.position), : len(self.position)]
+
+
+def _past_changes(recording: Recording, stop: int) -> int:
+    """Where a piece ends that was to end before row ``stop``: not with a row whose inputs are others.
+
+    When they changed is seen by the rows after it. One more than there are rows where they change to the last.
+    """
+    rows = np.arange(max(stop - 2, 0), recording.times.size)
+    changed = np.zeros(rows.size - 1, dtype=bool)
+    for name, held in zip(recording.input_names, recording.held.tolist(), strict=True):
+        if held:
+            values = recording.input_at(name, recording.times)
+            changed |= np.abs(np.diff(values[rows])) > CHANGED * np.abs(values).max()
+    settled = np.flatnonzero(~changed)
+    return stop + int(settled[0]) if settled.size else recording.times.size + 1
 
 
 def _own_part(belief: Belief) -> tuple[tuple[Coordinate, ...], Array, Array]:

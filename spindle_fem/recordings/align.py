@@ -92,6 +92,8 @@ class Recording:
     unseen_changes : tuple of (input, float, float), [s]
         Readings between which a held input changed while others were read in between; set by
         a diagnosis.
+    whole_spacing : float or None, [s]
+        Usual distance of the rows of which these are a piece.
     displacement_names, displacement_sensors : tuple of str
         Columns, and the sensor of the machine of each.
     displacements : (N, d) float64 ndarray, [m]
@@ -127,6 +129,12 @@ class Recording:
     displacement_sigma: Array = field(default_factory=lambda: np.empty(0))
     displacement_noise: tuple[ChannelNoise, ...] = ()
     unseen_changes: tuple[tuple[str, float, float], ...] = ()
+    whole_spacing: float | None = None
+
+    @property
+    def usual_spacing(self) -> float:
+        """Usual distance of two rows, s: of the whole where these are a piece of it."""
+        return self.whole_spacing or float(np.median(np.diff(self.times)))
 
     @property
     def temperature_count(self) -> int:

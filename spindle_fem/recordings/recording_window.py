@@ -200,4 +200,5 @@ def piece_of(recording: Recording, begin: int, stop: int) -> Recording:
         covariates=recording.covariates[rows],
         displacements=recording.displacements[rows],
         segments=np.array([[0, stop - begin]], dtype=np.int64),
+        whole_spacing=recording.usual_spacing,
     )

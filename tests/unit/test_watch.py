@@ -203,13 +203,17 @@ def test_pieces_of_a_run_are_the_run(fast, tmp_path, monkeypatch, providers):
     names = [c.name for c in coordinates]
     assert any(name.startswith("misdescribed.") for name in names)
     values = {c.name: c.at(0.5) for c in coordinates}
-    whole, _ = run.follow(recording, values, names, 60.0)
+    whole, _, opened = run.follow(recording, values, names, 60.0)
     run.restart()
-    for begin, stop in ((0, 25), (24, 31), (30, 91), (90, 120)):
-        piece, observed = run.follow(piece_of(recording, begin, stop), values, names, 60.0)
-    assert sum(item.bins.number.sum() for item in observed) == 2 * 29
+    for begin, stop in ((0, 25), (24, 35), (34, 95), (94, 120)):
+        piece, observed, open_now = run.follow(piece_of(recording, begin, stop), values, names, 60.0)
+    assert sum(item.bins.number.sum() for item in observed) == 2 * 25
     assert piece.temperature[-1] == pytest.approx(whole.temperature[-1], abs=1e-3)
     assert piece.sensitivity[-1] == pytest.approx(whole.sensitivity[-1], rel=1e-3, abs=2e-3)
+    # Each of the two changes is between rows of one piece.
+    assert open_now.shape[2] == opened.shape[2] == 2
+    assert open_now[-1] == pytest.approx(opened[-1], rel=1e-3, abs=1e-4)
+    assert np.abs(opened[-1]).max() > 0.01
     # A small change of a coordinate moves the state that is carried on as its derivative says.
     name = names[0]
     before = run.begun[0].copy()

@@ -79,10 +79,10 @@ def test_growth_is_followed_from_piece_to_piece(fast, sound):
     names = [c.name for c in coordinates]
     assert "misdescribed.expansion" in names
     values = {c.name: c.at(0.5) for c in coordinates}
-    whole, _ = run.follow(grown, values, names, 60.0)
+    whole, *_ = run.follow(grown, values, names, 60.0)
     run.restart()
     for begin, stop in ((0, 40), (39, 100), (99, RUN.size)):
-        piece, _ = run.follow(piece_of(grown, begin, stop), values, names, 60.0)
+        piece, *_ = run.follow(piece_of(grown, begin, stop), values, names, 60.0)
     assert piece.temperature[-1] == pytest.approx(whole.temperature[-1], abs=2e-3)
     assert piece.sensitivity[-1] == pytest.approx(whole.sensitivity[-1], rel=2e-3, abs=1e-2)
 

@@ -1,0 +1,66 @@
+"""What rows and gaps leave open of a machine that is followed: when inputs changed, what happened in gaps.
+
+To first order each is one unknown number with a known spread, and what a deviation of it does to the machine
+is carried from piece to piece of a recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spindle_fem.inference.candidate_response import BaseRun
+from spindle_fem.inference.recording_gaps import (
+    TIMES,
+    Hidden,
+    hidden_forcing,
+    jump_forcing,
+    weights_of_earlier,
+)
+
+Array = NDArray[np.float64]
+
+
+def nothing_open(states: int) -> Array:
+    """Changes of the states (r, 1) where nothing was left open yet: what is expected alone."""
+    return np.zeros((states, 1))
+
+
+def carried_on(
+    base: BaseRun, begun: Array, jumps: Sequence[tuple[int, float, float]], hidden: Sequence[Hidden]
+) -> tuple[Array, Array]:
+    """Changes over a piece by what it and earlier ones leave open.
+
+    Parameters
+    ----------
+    base : BaseRun
+        Of the piece.
+    begun : (r, 1 + e) ndarray, [K]
+        Changes of the states at the start of the piece: what is expected of all that was open, then a
+        standard deviation of each.
+    jumps : sequence of n (int, float, float)
+        As :func:`unseen_jumps` gives them: each moment is as likely anywhere between its bounds.
+    hidden : sequence of m Hidden
+
+    Returns
+    -------
+    channels : (G + 1, c, 1 + e + n + m) ndarray, [K]
+    states : (r, 1 + e + n + m) ndarray, [K]
+        At the end of the piece.
+    """
+    steps, size = len(base.run.drive.steps), len(begun)
+    least, most = np.array([item[1:] for item in jumps]).reshape(-1, 2).T
+    earlier = jump_forcing(base.run, base.states, jumps).reshape(steps, size, len(jumps), TIMES)
+    weights, slopes = weights_of_earlier(most, 0.5 * (least + most))
+    slopes = slopes * ((most - least) / np.sqrt(12.0))[:, None]
+    within = hidden_forcing(base.run, base.predictor.fast, hidden) * [item.sigma for item in hidden]
+    fresh = np.concatenate((np.einsum("grnt,nt->grn", earlier, slopes), within), axis=2)
+    forcing = np.zeros((steps, size, begun.shape[1] + fresh.shape[2]))
+    forcing[:, :, 0] = np.einsum("grnt,nt->gr", earlier, weights)
+    forcing[:, :, begun.shape[1] :] = fresh
+    start = np.zeros((1, *forcing.shape[1:]))
+    start[0, :, : begun.shape[1]] = begun
+    states = base.run.tangents(forcing, base.tracks, start=start)
+    return base.outputs(states), states[-1]
