@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.recording_gaps import (
     TIMES,
+    WARMTH,
     Hidden,
     hidden_forcing,
     jump_forcing,
@@ -21,6 +22,10 @@ from spindle_fem.inference.recording_gaps import (
 )
 
 Array = NDArray[np.float64]
+
+# Friction within a gap, one standard deviation as a share of the highest: the machine may have stood as well
+# as run. A diagnosis, which reads on beyond the gap, expects less of it.
+STOOD_OR_RAN = 1.0
 
 
 def nothing_open(states: int) -> Array:
@@ -55,7 +60,8 @@ def carried_on(
     earlier = jump_forcing(base.run, base.states, jumps).reshape(steps, size, len(jumps), TIMES)
     weights, slopes = weights_of_earlier(most, 0.5 * (least + most))
     slopes = slopes * ((most - least) / np.sqrt(12.0))[:, None]
-    within = hidden_forcing(base.run, base.predictor.fast, hidden) * [item.sigma for item in hidden]
+    spread = [item.sigma if item.what in WARMTH else max(item.sigma, STOOD_OR_RAN) for item in hidden]
+    within = hidden_forcing(base.run, base.predictor.fast, hidden) * spread
     fresh = np.concatenate((np.einsum("grnt,nt->grn", earlier, slopes), within), axis=2)
     forcing = np.zeros((steps, size, begun.shape[1] + fresh.shape[2]))
     forcing[:, :, 0] = np.einsum("grnt,nt->gr", earlier, weights)

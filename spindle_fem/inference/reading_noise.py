@@ -54,6 +54,20 @@ class SlowError:
                 return SlowError(sigma, time)
         return self
 
+    def no_less_than(self, other: SlowError) -> SlowError:
+        """The slow error where another is nowhere larger or longer.
+
+        >>> SlowError(0.02, 3000.0).no_less_than(SlowError(0.04, 1500.0))
+        SlowError(sigma=0.04, time=3000.0, channels=())
+        """
+        keys = dict.fromkeys(key for key, _, _ in (*self.channels, *other.channels))
+        channels = [(key, self.of(key), other.of(key)) for key in keys]
+        return SlowError(
+            max(self.sigma, other.sigma),
+            max(self.time, other.time),
+            tuple((key, max(a.sigma, b.sigma), max(a.time, b.time)) for key, a, b in channels),
+        )
+
     @classmethod
     def each(cls, channels: Mapping[int, SlowError]) -> SlowError:
         """A slow error for every channel, by the key of its bins; the common one is that of temperatures."""

@@ -33,9 +33,7 @@ TIMES = 4
 def gap_pieces(recording: Recording) -> tuple[tuple[float, float], ...]:
     """Gaps long enough for something to have happened in them, in pieces of some minutes, [s]."""
     spacing = np.diff(recording.times)
-    rows = np.flatnonzero(
-        (spacing > GAP_STEPS * recording.usual_spacing) & (spacing >= tuned.SHORTEST_GAP)
-    )
+    rows = np.flatnonzero((spacing > GAP_STEPS * recording.usual_spacing) & (spacing >= tuned.SHORTEST_GAP))
     found = []
     for row in rows:
         first, last = recording.times[row : row + 2]

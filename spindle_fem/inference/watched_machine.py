@@ -40,7 +40,7 @@ PIECE_INSTANTS = 60
 _OWN_HERE = (START_PREFIX, MISDESCRIBED_IN_PREFIX)
 # Moments and events that rows and gaps leave open, of some hours of work: what earlier ones did faded.
 MOST_OPEN = 60
-# Rows whose inputs differ by more than this share of the largest are amid a change, which a piece does not end.
+# Rows whose inputs differ by more than this share of the largest are amid a change: no piece ends there.
 CHANGED = 0.02
 # Innovations by which the spread is judged, at most.
 MOST_NUMBERS = 20_000
@@ -304,7 +304,7 @@ class WatchedMachine:
 def _past_changes(recording: Recording, stop: int) -> int:
     """Where a piece ends that was to end before row ``stop``: not with a row whose inputs are others.
 
-    When they changed is seen by the rows after it. One more than there are rows where they change to the last.
+    When they changed is seen by the rows after it. One more than there are rows, where the last is such one.
     """
     rows = np.arange(max(stop - 2, 0), recording.times.size)
     changed = np.zeros(rows.size - 1, dtype=bool)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from spindle_fem.inference.continued_run import ContinuedRun
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.opened_machine import open_machine, with_growth
 from spindle_fem.inference.predictor import LONGEST_BIN, STEP, Predictor
-from spindle_fem.inference.prepared_problem import Calibrated, calibrate
+from spindle_fem.inference.prepared_problem import Calibrated, calibrate, expected_slow_error
 from spindle_fem.inference.watched_machine import MONTH, Judgement, WatchedMachine, white_noise
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import Recording, read_recording
@@ -192,7 +192,11 @@ def _begin(
         progress("calibration")
         earlier = Predictor(opened.fast, opened.calibration, effects=opened.effects)
         earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
-    known = calibrate(earlier, run.begins(piece_of(first, 0, first.times.size)))
+    begun = run.begins(piece_of(first, 0, first.times.size))
+    known = calibrate(earlier, begun)
+    if not opened.is_network:
+        # A fit of hours takes up part of the slow error and does not show how far it wanders in a month.
+        known = replace(known, slow=known.slow.no_less_than(expected_slow_error(begun)))
     watched = WatchedMachine(
         run,
         known,

@@ -17,9 +17,10 @@ from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.innovations import InnovationFilter
 from spindle_fem.inference.misdescription_columns import PROVIDERS
 from spindle_fem.inference.opened_machine import open_machine
+from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates
 from spindle_fem.inference.reading_noise import SlowError
-from spindle_fem.inference.watched_machine import WatchedMachine
+from spindle_fem.inference.watched_machine import WatchedMachine, white_noise
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.growing_file import follow_lines
@@ -213,7 +214,7 @@ def test_pieces_of_a_run_are_the_run(fast, tmp_path, monkeypatch, providers):
     # Each of the two changes is between rows of one piece.
     assert open_now.shape[2] == opened.shape[2] == 2
     assert open_now[-1] == pytest.approx(opened[-1], rel=1e-3, abs=1e-4)
-    assert np.abs(opened[-1]).max() > 0.01
+    assert np.abs(opened).max() > 0.1
     # A small change of a coordinate moves the state that is carried on as its derivative says.
     name = names[0]
     before = run.begun[0].copy()
@@ -334,3 +335,27 @@ def test_after_a_gap_a_network_begins_again_and_geometry_waits(fast, folder, tmp
     told = watched.follow(recording, to_end=True)
     assert {item.state for item in told} == {"as modelled"}
     assert 300.0 < run.slowest_time() < 1e6
+
+
+def test_what_rows_and_gaps_hide_is_no_departure(fast, tmp_path, monkeypatch):
+    monkeypatch.setattr(misdescription_columns, "PROVIDERS", (heat_misdescriptions,))
+    fine, stood = np.arange(0.0, 4.0 * 3600.0, 20.0), (8000.0, 8800.0)
+    # Changes 100, 60 and 20 s before the row that shows them, and a stop that no row shows.
+    speed = np.select([fine < 1220.0, fine < 4260.0, fine < 6100.0], [0.0, 3000.0, 800.0], 3000.0)
+    speed[(fine > stood[0]) & (fine < stood[1])] = 0.0
+    inputs = {"speed": "speed", "room": "ambient", "oil": "coolant_inlet"}
+    frame = pd.DataFrame(
+        {"time": fine, "SP01": 20.0, "SP03": 20.0, "speed": speed, "room": 20.0, "oil": 20.0}
+    )
+    probes = {"SP01": "SP01", "SP03": "SP03"}
+    truth = read_recording(write_recording(tmp_path / "all", frame, probes, inputs))
+    told = Predictor(fast, [truth], at_stamps=True).predict(0, {}, ()).temperature - 273.15
+    noise = 0.05 * np.random.default_rng(4).standard_normal(told.shape)
+    frame[["SP01", "SP03"]] = told + noise
+    rows = (np.arange(fine.size) % 6 == 0) & ~((fine > stood[0] - 200.0) & (fine < stood[1] + 200.0))
+    seen = read_recording(write_recording(tmp_path / "seen", frame[rows], probes, inputs), long_gap=np.inf)
+    run = ContinuedRun(fast, NO_EFFECTS)
+    watched = WatchedMachine(
+        run, calibrate(None, run.begins(seen)), white_noise(seen), width=120.0, alarms=1.0
+    )
+    assert {item.state for item in watched.follow(seen, to_end=True)} == {"as modelled"}
