@@ -40,6 +40,16 @@ def examples(recordings: Path) -> dict[str, tuple[Path, str, Path]]:
     return found
 
 
+def cases_of(study: Path) -> dict[str, tuple[Path, str, Path]]:
+    """The same of a study's cases."""
+    found = {}
+    for manifest in sorted((study / "inputs").glob("*/recording.toml")):
+        case = manifest.parent
+        own, answer = case / "machine.toml", study / "answers" / f"{case.name}.json"
+        found[case.name] = (case, str(own) if own.exists() else "recorded_spindle", answer)
+    return found
+
+
 def noise_of(answer: dict[str, Any]) -> float:
     """Smallest held-out error of a right diagnosis, K, sensors and structure together."""
     if "heldout_rmse_K_with_it" in answer:

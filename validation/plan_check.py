@@ -20,28 +20,14 @@ from typing import Any
 import numpy as np
 
 from .asked import wilson
-from .open_examples import MESH, accepted_sets, examples
+from .open_examples import MESH, accepted_sets, cases_of, examples
 from .score import first_right, matches, ranked_sets
-
-MACHINE = "recorded_spindle"
 
 
 def cases(results: Path, study: Path | None, recordings: Path) -> Iterator[tuple[str, Path, str, Path]]:
     """Name, folder of inputs, machine and answer of every case that has a diagnosis."""
-    if study is None:
-        found = ((name, *item) for name, item in examples(recordings).items())
-    else:
-        folders = sorted(path.parent for path in (study / "inputs").glob("*/recording.toml"))
-        found = (
-            (
-                folder.name,
-                folder,
-                str(folder / "machine.toml") if (folder / "machine.toml").exists() else MACHINE,
-                study / "answers" / f"{folder.name}.json",
-            )
-            for folder in folders
-        )
-    for name, folder, machine, answer in found:
+    found = examples(recordings) if study is None else cases_of(study)
+    for name, (folder, machine, answer) in found.items():
         if (results / name / "diagnosis.json").exists() and answer.exists():
             yield name, folder, machine, answer
 

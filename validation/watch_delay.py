@@ -1,8 +1,10 @@
 """How soon a watch says that a recording has left its machine, and how often it says so wrongly.
 
-``python -m validation.watch_delay RESULTS [--recordings DIR] [--only NAME ...] [--alarms 1/month]`` watches
-every open example to its end, writes ``RESULTS/watch_delay.json`` and prints a table: effect, onset, delay
-to "leaving" and to "left", channel, and for what is sound the number of alarms and the hours it was watched.
+``python -m validation.watch_delay RESULTS [--recordings DIR | --study DIR] [--only NAME ...] [--sound]``
+watches every open example, or every case of a study, to its end, writes ``RESULTS/watch_delay.json`` and
+prints a table: effect, onset, delay to "leaving" and to "left", channel, and for what is sound the number of
+alarms and the hours it was watched. With ``--sound`` only consistent machines are watched. ``--alarms`` is
+``--false-alarms`` of the command.
 
 A machine with calibration recordings is calibrated by them; a network without begins with a warm-up, the
 first fifth of its recording, but no longer than up to the onset where the effect has one. Delays count from
@@ -24,7 +26,7 @@ from spindle_fem.definition.network_load import is_network_machine
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.studies.watch import Watching, alarms_a_month, watch_recording
 
-from .open_examples import MESH, examples
+from .open_examples import MESH, cases_of, examples
 
 WARM_UP_SHARE = 0.2
 # Calibration recordings are watched as well: the second half, calibrated by the first.
@@ -40,6 +42,11 @@ def onset_of(answer: dict[str, Any]) -> float:
     effects = answer.get("effects", [])
     starts = [effect["intervals"][0][0] if effect.get("intervals") else 0.0 for effect in effects]
     return float(min(starts, default=np.inf))
+
+
+def concealed(answer: dict[str, Any]) -> list[str]:
+    """Effects that an answer names."""
+    return [effect["effect"] for effect in answer.get("effects", answer.get("acceptable", []))]
 
 
 def watch_case(name: str, case: Path, machine: str, answer: Path, alarms: str) -> dict[str, Any]:
@@ -75,7 +82,7 @@ def watch_case(name: str, case: Path, machine: str, answer: Path, alarms: str) -
     first = next((lines[i] for i in np.flatnonzero(states == "left") if at[i] >= counted), {})
     return {
         "case": name,
-        "truth": [effect["effect"] for effect in truth.get("effects", truth.get("acceptable", []))],
+        "truth": concealed(truth),
         "onset_s": None if np.isinf(onset) else onset,
         "watched_h": (duration - float(at[0])) / 3600.0,
         "sound_h": max(0.0, min(onset, duration) - float(at[0])) / 3600.0,
@@ -100,15 +107,19 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("results", type=Path)
     parser.add_argument("--recordings", type=Path, default=Path("../shared/recordings"))
+    parser.add_argument("--study", type=Path)
+    parser.add_argument("--sound", action="store_true", help="consistent machines only")
     parser.add_argument("--only", nargs="*", default=[], help="names or beginnings of names")
     parser.add_argument("--alarms", default="1/month")
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args(arguments)
     given.results.mkdir(parents=True, exist_ok=True)
+    found = examples(given.recordings) if given.study is None else cases_of(given.study)
     wanted = {
         name: item
-        for name, item in examples(given.recordings).items()
-        if not given.only or name.startswith(tuple(given.only))
+        for name, item in found.items()
+        if (not given.only or name.startswith(tuple(given.only)))
+        and not (given.sound and concealed(json.loads(item[2].read_text())))
     }
     wanted |= {name + SOUND: item for name, item in wanted.items() if (item[0] / "calibration.toml").exists()}
     rows = []
