@@ -157,8 +157,7 @@ class WatchedMachine:
         self.run.restart()
         self._kelvins, every = piece.temperature_count, len(self.white)
         slow = [
-            self.slow if channel < self._kelvins else self.slow.of(channel - every)
-            for channel in range(every)
+            self.slow.of(channel if channel < self._kelvins else channel - every) for channel in range(every)
         ]
         self._filter = InnovationFilter(covariance, slow, range(self._kelvins, every))
 

@@ -83,6 +83,7 @@ def thinned_recording(
     thinned = replace(
         recording,
         times=stamps,
+        whole_spacing=None,
         temperature=temperature,
         flags=np.where(missing, np.uint8(Flag.MISSING), np.uint8(0)),
         sigma=np.clip(sigma, SMALLEST_SIGMA, np.maximum(recording.sigma, SMALLEST_SIGMA)),

@@ -194,9 +194,8 @@ def _begin(
         earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
     begun = run.begins(piece_of(first, 0, first.times.size))
     known = calibrate(earlier, begun)
-    if not opened.is_network:
-        # A fit of hours takes up part of the slow error and does not show how far it wanders in a month.
-        known = replace(known, slow=known.slow.no_less_than(expected_slow_error(begun)))
+    # A fit of hours takes up part of the slow error and does not show how far it wanders in a month.
+    known = replace(known, slow=known.slow.no_less_than(expected_slow_error(earlier or begun)))
     watched = WatchedMachine(
         run,
         known,
