@@ -4,7 +4,7 @@ Every ``STUDY`` is a folder of one of the generators with ``answers`` and ``resu
 (the rows of every case, the figures that follow from them, a worked case, real recordings), pictures, and
 ``README.md``, which is rendered from ``proof.json`` alone, so that every number on it is stored there. Real
 recordings, riddles and other programs that are not given again stay as they stand there, with ``--keep``
-other studies too.
+other studies and the worked case too.
 """
 
 import argparse
@@ -298,7 +298,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument(
         "--book", type=Path, default=None, help="work folder of the book, with its riddles and peers"
     )
-    parser.add_argument("--keep", action="store_true", help="other studies on the page stay, after these")
+    parser.add_argument("--keep", action="store_true", help="what else is on the page stays, after these")
     given = parser.parse_args(arguments)
     studies = [(study, study / given.results) for study in given.study]
     data = build(studies, given.worked, (given.real, given.recordings), given.book)
@@ -309,6 +309,7 @@ def main(arguments: list[str] | None = None) -> None:
         data |= {part: known[part] for part in ("riddles", "programs", "real") if not data[part]}
         if given.keep:
             data["studies"] += kept_studies(known["studies"], data["studies"])
+            data["worked"] = data["worked"] if given.worked else known["worked"]
     from .proof_pictures import draw_all
 
     draw_all(data, {study.name: (study, results) for study, results in studies}, given.output)

@@ -17,7 +17,7 @@ def draw_all(data: dict[str, Any], studies: dict[str, tuple[Path, Path]], output
     for study in data["studies"]:
         figure = by_family(study["summary"], study["title"])
         save_png(figure, output / f"by_family_{study['name']}.png", colours=COLOURS)
-    if data["worked"]:
+    if data["worked"] and data["worked"]["study"] in studies:
         study, results = studies[data["worked"]["study"]]
         save_png(worked(data["worked"], study, results), output / "worked_case.png", colours=COLOURS)
 
