@@ -190,6 +190,13 @@ def figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """The figures of some rows; with effects that cannot be seen left out of what has to be named."""
     shown = [r for r in rows if not r["consistent"] and r["detectable"]]
     clear = [r for r in shown if not r["undecidable"]]
+    doubtful = [r for r in shown if r["undecidable"] and r.get("called_undecidable") is not None]
+    # A guess among sets that read alike would name the right one in half of the cases at most.
+    decided = [
+        r | {"as_it_is": sorted(r["found"]) == sorted(r["truth"])}
+        for r in doubtful
+        if r["found"] and r["verdict"] != "ambiguous"
+    ]
     stated = [c for r in rows for c in r.get("intervals", [])]
     return {
         "cases": len(rows),
@@ -201,7 +208,8 @@ def figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "flagged_of_consistent": share([r for r in rows if r["consistent"]], "flagged"),
         "place": share(shown, "place"),
         "confident_wrong": share(rows, "confident_wrong"),
-        "undecidable_called": share([r for r in shown if r["undecidable"]], "called_undecidable"),
+        "undecidable_called": share(doubtful, "called_undecidable"),
+        "undecidable_named": share(decided, "as_it_is"),
         "intervals_hold": share(stated, "inside"),
         "states_f1": middle([r.get("states_f1") for r in shown if r.get("states_seen")]),
         "after_over_noise": middle([r.get("after_over_noise") for r in clear if r["set_first"]]),

@@ -198,7 +198,7 @@ def test_heat_of_one_law_at_two_spots_is_one_set_named_at_the_larger():
 @pytest.mark.parametrize(
     ("law", "constant_law"),
     [
-        ("gap_closure", "joint_conductance"),
+        *((law, "joint_conductance") for law in ("gap_closure", "radiation", "natural_convection")),
         *((law, "heat_scale") for law in ("drive_heat", "seal_friction", "grease_churning", "starvation")),
         ("sensor_detached", "sensor_lag"),
     ],

@@ -99,6 +99,17 @@ def test_what_is_too_faint_to_be_named_is_not_asked_to_be_called_undecidable():
     assert not must_be_told(twin | {"acceptable_sets": [*seen["acceptable_sets"], []]})
 
 
+def test_undecidable_cases_are_called_so_or_named_as_they_are(rows):
+    asked = rows[0] | {"undecidable": True, "detectable": True, "consistent": False}
+    called = asked | {"called_undecidable": True, "verdict": "ambiguous", "found": ["mount_sink@flange"]}
+    named = asked | {"called_undecidable": False, "verdict": "missing_physics", "found": asked["truth"]}
+    guessed = named | {"found": ["mount_sink@flange"]}
+    silent = named | {"verdict": "consistent", "found": []}
+    found = figures([called, named, guessed, silent])
+    assert found["undecidable_called"]["share"] == 0.25
+    assert (found["undecidable_named"]["share"], found["undecidable_named"]["of"]) == (0.5, 2)
+
+
 def test_nothing_to_count_gives_no_share():
     assert figures([])["right"]["share"] is None
 

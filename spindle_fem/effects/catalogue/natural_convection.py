@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
+from spindle_fem.effects.catalogue.joint_conductance import JointConductance
 from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude, linear, power
@@ -36,6 +37,8 @@ class NaturalConvection(OutsideFilmEffect):
 
     name = "natural_convection"
     term_kind = NaturalConvectionTerm
+    # On top of a link that carries none of it, and over a small range, it is a factor on the link.
+    repeats = JointConductance.name
     title = "the outside film grows with the temperature difference to the room"
     check = (
         "Outside surfaces for covers, draught and dirt; measure wall and air temperature at two steady "

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
+from spindle_fem.effects.catalogue.joint_conductance import JointConductance
 from spindle_fem.effects.framework.card import Card
 from spindle_fem.effects.framework.effect import Candidate, Reported, capital, place_words
 from spindle_fem.effects.framework.laws import Complex, amplitude
@@ -42,6 +43,8 @@ class Radiation(OutsideFilmEffect):
 
     name = "radiation"
     term_kind = RadiationTerm
+    # On top of a link that carries none of it, and over a small range, it is a factor on the link.
+    repeats = JointConductance.name
     title = "surfaces lose heat by radiation, faster than in proportion to their temperature"
     check = (
         "Paint and bare metal of the outside (emissivity), hot or cold bodies in sight (oven, window, "
