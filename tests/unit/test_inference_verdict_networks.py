@@ -23,10 +23,10 @@ def test_events_of_a_network_are_named_where_laws_without_them_leave_too_much():
 
     enough = 0.9 - tuned.LEAST_OF_EVENTS
 
-    def found(of_nothing, of_law, *sets, coarseness=2.0, later=enough):
+    def found(of_nothing, of_law, *sets, coarseness=2.0, later=enough, of_event=1.5):
         rest = {id(null.fit): of_nothing, id(law.fit): of_law}
         left = {
-            "left": lambda fit: rest.get(id(fit), 1.0),
+            "left": lambda fit: rest.get(id(fit), of_event),
             "beyond": lambda fit: later if event in fit.candidates else 1.0,
         }
         return verdict(*sets, coarseness=coarseness, **left).chosen.fit.keys
@@ -53,6 +53,10 @@ def test_events_of_a_network_are_named_where_laws_without_them_leave_too_much():
     # It tells held-out readings far better.
     assert found(little, much, null, alone, later=0.9 - tuned.IMPROVEMENT_OF_EVENTS) == alone.keys
     assert found(little, much, null, alone, later=1.1 - tuned.IMPROVEMENT_OF_EVENTS) == null.keys
+    # It tells a few of them hardly better, but leaves far less of all.
+    hardly = 0.9 * (1.0 - tuned.LEAST_IMPROVEMENT)
+    assert found(little, much, null, alone, later=hardly, of_event=1.0) == alone.keys
+    assert found(little, much, null, alone, later=1.0, of_event=1.0) == null.keys
     assert found(much, little, null, law, both) == law.keys
     assert found(much, much, null, law, both) == both.keys
     # A law elsewhere that leaves little does as well.

@@ -249,9 +249,9 @@ class Effect(ABC):
         Whether its amplitude is a time by which a channel is late, as that of every sensor is by a little.
     repeats : str
         Effect that its law is, at the same place, at some of its values; empty for none. (A gap that is
-        closed conducts as a contact; a film on top of a link is a factor on it; churning that never ends, starvation at all speeds, or heat by the power
-        of speed that a node's own heat follows, is a factor on that heat; a sensor that hardly reads the air
-        is late.)
+        closed conducts as a contact; a film on top of a link is a factor on it; churning that never ends,
+        starvation at all speeds, or heat by the power of speed that a node's own heat follows, is a factor
+        on that heat; a sensor that hardly reads the air is late.)
     """
 
     name: str
