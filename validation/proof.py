@@ -31,6 +31,8 @@ TITLES = {
     "meridian": "Belt-driven spindles of other sizes, without cooling",
     "networks": "Machines without drawings",
 }
+# Order of the studies on the page: by generator, of each the latest seed first.
+ORDER = ("rough", "networks", "meridian", SPINDLE)
 DIGITS = 4
 
 
@@ -298,7 +300,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument(
         "--book", type=Path, default=None, help="work folder of the book, with its riddles and peers"
     )
-    parser.add_argument("--keep", action="store_true", help="what else is on the page stays, after these")
+    parser.add_argument("--keep", action="store_true", help="what else is on the page stays")
     given = parser.parse_args(arguments)
     studies = [(study, study / given.results) for study in given.study]
     data = build(studies, given.worked, (given.real, given.recordings), given.book)
@@ -310,6 +312,7 @@ def main(arguments: list[str] | None = None) -> None:
         if given.keep:
             data["studies"] += kept_studies(known["studies"], data["studies"])
             data["worked"] = data["worked"] if given.worked else known["worked"]
+    data["studies"].sort(key=lambda study: (ORDER.index(study["generator"]), -study["seed"]))
     from .proof_pictures import draw_all
 
     draw_all(data, {study.name: (study, results) for study, results in studies}, given.output)

@@ -15,7 +15,12 @@ def recorded(speed, gap=(12000.0, 13200.0)):
     """A recording of a speed over the time, rows every minute but within a gap."""
     begin, end = gap
     times = np.concatenate((np.arange(0.0, begin + 1.0, 60.0), np.arange(end, LAST + 1.0, 60.0)))
-    return SimpleNamespace(times=times, input_names=("speed",), input_at=lambda name, t: speed(np.asarray(t)))
+    return SimpleNamespace(
+        times=times,
+        input_names=("speed",),
+        input_at=lambda name, t: speed(np.asarray(t)),
+        usual_spacing=60.0,
+    )
 
 
 def on_and_off(t):
@@ -43,5 +48,5 @@ def test_windows_with_a_gap_of_their_own_and_speeds_nobody_recorded_tell_nothing
     once = recorded(lambda t: 3000.0 * (t > 12100.0))
     kept = once.times[(once.times <= 3000.0) | (once.times >= 4200.0)]
     assert spread_within(SimpleNamespace(**vars(once) | {"times": kept}), 3000.0, 3600.0) == 0.0
-    unread = SimpleNamespace(times=np.arange(0.0, LAST, 60.0), input_names=())
+    unread = SimpleNamespace(times=np.arange(0.0, LAST, 60.0), input_names=(), usual_spacing=60.0)
     assert spread_within(unread, 60.0, 120.0) == 0.0
