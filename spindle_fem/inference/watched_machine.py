@@ -42,6 +42,8 @@ _OWN_HERE = (START_PREFIX, MISDESCRIBED_IN_PREFIX)
 MOST_OPEN = 60
 # Rows whose inputs differ by more than this share of the largest are amid a change: no piece ends there.
 CHANGED = 0.02
+# But where they differ over more rows than this: such is the machine's work, and a watch must go on.
+MOST_AMID = 10
 # Innovations by which the spread is judged, at most.
 MOST_NUMBERS = 20_000
 # Instants by which heating and cooling are distinguished.
@@ -303,16 +305,19 @@ class WatchedMachine:
 def _past_changes(recording: Recording, stop: int) -> int:
     """Where a piece ends that was to end before row ``stop``: not with a row whose inputs are others.
 
-    When they changed is seen by the rows after it. One more than there are rows, where the last is such one.
+    When they changed is seen by the rows after it. One more than there are rows, where rows to come tell.
     """
-    rows = np.arange(max(stop - 2, 0), recording.times.size)
+    size, most = recording.times.size, stop + MOST_AMID
+    rows = np.arange(max(stop - 2, 0), min(size, most))
     changed = np.zeros(rows.size - 1, dtype=bool)
     for name, held in zip(recording.input_names, recording.held.tolist(), strict=True):
         if held:
             values = recording.input_at(name, recording.times)
             changed |= np.abs(np.diff(values[rows])) > CHANGED * np.abs(values).max()
     settled = np.flatnonzero(~changed)
-    return stop + int(settled[0]) if settled.size else recording.times.size + 1
+    if settled.size:
+        return stop + int(settled[0])
+    return stop if size >= most else size + 1
 
 
 def _own_part(belief: Belief) -> tuple[tuple[Coordinate, ...], Array, Array]:

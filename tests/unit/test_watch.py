@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,7 @@ from spindle_fem.inference.opened_machine import open_machine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate, machine_coordinates
 from spindle_fem.inference.reading_noise import SlowError
-from spindle_fem.inference.watched_machine import WatchedMachine, white_noise
+from spindle_fem.inference.watched_machine import MOST_AMID, WatchedMachine, _past_changes, white_noise
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.growing_file import follow_lines
@@ -359,3 +360,25 @@ def test_what_rows_and_gaps_hide_is_no_departure(fast, tmp_path, monkeypatch):
         run, calibrate(None, run.begins(seen)), white_noise(seen), width=120.0, alarms=1.0
     )
     assert {item.state for item in watched.follow(seen, to_end=True)} == {"as modelled"}
+
+
+@pytest.mark.parametrize(
+    ("speed", "stop", "expected"),
+    [
+        ([0.0, 0.0, 0.0, 3000.0, 3000.0], 3, 3),
+        ([0.0, 0.0, 0.0, 3000.0, 3000.0], 4, 5),
+        # A change over two rows, one that may go on, and a speed that never rests.
+        ([0.0, 0.0, 0.0, 1500.0, 3000.0, 3000.0], 4, 6),
+        ([0.0, 0.0, 0.0, 1500.0, 3000.0], 4, 6),
+        ([0.0, *range(1000, 1000 + 100 * (MOST_AMID + 4), 100)], 4, 4),
+    ],
+)
+def test_a_piece_does_not_end_with_a_row_whose_inputs_are_others(speed, stop, expected):
+    values = np.array(speed)
+    recording = SimpleNamespace(
+        times=60.0 * np.arange(values.size),
+        input_names=("speed",),
+        held=np.array([True]),
+        input_at=lambda name, times: np.interp(times, 60.0 * np.arange(values.size), values),
+    )
+    assert _past_changes(recording, stop) == expected
