@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from spindle_fem.inference import tuned
+from spindle_fem.inference.heldout import left_of_all
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.like_sets import free_in_time, states_alone
@@ -39,8 +40,8 @@ def with_needed_events(
         share = tuned.LEAST_OF_EVENTS if leaves_much else tuned.IMPROVEMENT_OF_EVENTS
         if not 0.0 < beyond(item.fit) < (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(other.fit):
             return False
-        # A first step may show in few of the held-out readings, which are a quarter of all.
-        rest, before = (np.sqrt(3.0 * left(i.fit) ** 2 + beyond(i.fit) ** 2) for i in (item, other))
+        # A first step may show in few of the held-out readings.
+        rest, before = (left_of_all(left(i.fit), beyond(i.fit)) for i in (item, other))
         of_all = rest < (1.0 - tuned.IMPROVEMENT_OF_ALL) * before
         first = of_all and not events[id(other)] and not states_alone(item.fit)
         return first or beyond(item.fit) < (1.0 - share) * beyond(other.fit)

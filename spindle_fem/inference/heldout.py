@@ -68,3 +68,12 @@ def heldout_stamps(recording: Recording, choice: str = "blocks") -> tuple[NDArra
     if kind != "last" or not 0.0 < part <= 0.8:
         raise SpecError("heldout", f'"{choice}".', 'Allowed: "blocks", or "last:0.4" (a share up to 0.8).')
     return share > 1.0 - part, f"the last {100.0 * part:.0f} % of the time"
+
+
+def left_of_all(left: float, beyond: float) -> float:
+    """Root mean square of what is left of all readings, fitted and held out by default.
+
+    >>> left_of_all(2.0, 2.0), round(left_of_all(1.0, 2.0), 2)
+    (2.0, 1.32)
+    """
+    return float(np.sqrt(((EVERY - 1) * left**2 + beyond**2) / EVERY))

@@ -13,6 +13,7 @@ from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference import tuned
 from spindle_fem.inference.coarse_sets import that_leave_least, with_needed_events
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
+from spindle_fem.inference.heldout import left_of_all
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.like_sets import (
@@ -374,8 +375,7 @@ def _predicts(chosen: Hypothesis, empty: Hypothesis, asked: _Asked, odds: float,
         lower = beyond(chosen.fit) <= (1.0 - least) * beyond(empty.fit)
         enough = gain >= tuned.LEAST_HELDOUT_GAIN or not within
         return enough and lower and left(chosen.fit) <= most * left(empty.fit)
-    # A quarter of the readings is held out by default.
-    rest, before = (np.sqrt(3.0 * left(fit) ** 2 + beyond(fit) ** 2) for fit in (chosen.fit, empty.fit))
+    rest, before = (left_of_all(left(fit), beyond(fit)) for fit in (chosen.fit, empty.fit))
     lower = ruled_out or rest <= (1.0 - tuned.LEAST_IMPROVEMENT_DRAWN) * before
     return lower and max(gain, gain + odds) >= tuned.LEAST_HELDOUT_GAIN
 
