@@ -224,7 +224,8 @@ LEAST_IMPROVEMENT, LEAST_IMPROVEMENT_DRAWN = 0.03, 0.01
 # states, which follow held-out readings, from which on it may be named at all. (Consistent networks of seeds
 # 66 and 101: at most 0.17 in 21; states that had been missed there: 0.39 and 0.47. Right states of seeds 467
 # and 487: 0.30 and more; one on a consistent network 0.06.) Or of all readings, where few of those held out
-# show it. (Seed 571: events by 0.31 and more, sets with some that are not there by at most 0.04.)
+# show it. (Seed 571: the best sets of 14 cases with events by 0.27 and more, of seven without any by at most
+# 0.04.)
 IMPROVEMENT_OF_EVENTS, LEAST_OF_EVENTS, IMPROVEMENT_OF_ALL = 0.25, 0.15, 0.35
 # Share by which each of several effects of a network must lower what the others leave, of fitted and of
 # held-out readings, where that is no more than MOST_LEFT. (Of seeds 467, 487 and 509 22 right sets: by 0.22
