@@ -16,7 +16,7 @@ from spindle_fem.inference.heat_misdescriptions import clock_change
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import direction_columns, misdescriptions_of
 from spindle_fem.inference.observations import Observation, observe
-from spindle_fem.inference.open_events import carried_on, nothing_open
+from spindle_fem.inference.open_events import carried_on
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.predictor import STEP, Predictor
 from spindle_fem.inference.structural_misdescriptions import StructuralChange, model_with_directions
@@ -119,8 +119,8 @@ class ContinuedRun:
         # Derivatives of the state to directions of misdescription, which it does not follow itself.
         self._directions: dict[str, Array] = {}
         self._structural: tuple[Array, Mapping[str, Array]] | None = None
-        # What rows and gaps left open does to it.
-        self._open = nothing_open(self.fast.model.size)
+        # What rows and gaps left open does to it; nothing yet but for a column of what is expected.
+        self._open = np.zeros((self.fast.model.size, 1))
         self._run: TransientRun | None = None
 
     def begins(self, piece: Recording) -> Predictor:

@@ -28,11 +28,6 @@ Array = NDArray[np.float64]
 STOOD_OR_RAN = 1.0
 
 
-def nothing_open(states: int) -> Array:
-    """Changes of the states (r, 1) where nothing was left open yet: what is expected alone."""
-    return np.zeros((states, 1))
-
-
 def carried_on(
     base: BaseRun, begun: Array, jumps: Sequence[tuple[int, float, float]], hidden: Sequence[Hidden]
 ) -> tuple[Array, Array]:
