@@ -310,10 +310,10 @@ def _past_changes(recording: Recording, stop: int) -> int:
     size, most = recording.times.size, stop + MOST_AMID
     rows = np.arange(max(stop - 2, 0), min(size, most))
     changed = np.zeros(rows.size - 1, dtype=bool)
-    for name, held in zip(recording.input_names, recording.held.tolist(), strict=True):
-        if held:
-            values = recording.input_at(name, recording.times)
-            changed |= np.abs(np.diff(values[rows])) > CHANGED * np.abs(values).max()
+    for column in np.flatnonzero(recording.held):
+        values = recording.input_at(recording.input_names[column], recording.times[rows])
+        largest = np.nanmax(np.abs(recording.inputs[:, column]))
+        changed |= np.abs(np.diff(values)) > CHANGED * largest
     settled = np.flatnonzero(~changed)
     if settled.size:
         return stop + int(settled[0])

@@ -27,6 +27,7 @@ from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.growing_file import follow_lines
 from spindle_fem.recordings.manifest import load_manifest
 from spindle_fem.recordings.recording_window import RecordingWindow, piece_of
+from spindle_fem.studies import watch
 from spindle_fem.studies.watch import Watching, watch_recording
 from tests.conftest import write_recording
 from tests.support.written_texts import network_text
@@ -379,6 +380,17 @@ def test_a_piece_does_not_end_with_a_row_whose_inputs_are_others(speed, stop, ex
         times=60.0 * np.arange(values.size),
         input_names=("speed",),
         held=np.array([True]),
+        inputs=values[:, None],
         input_at=lambda name, times: np.interp(times, 60.0 * np.arange(values.size), values),
     )
     assert _past_changes(recording, stop) == expected
+
+
+def test_a_watch_expects_no_less_than_the_usual_slow_error_of_each_channel(folder, monkeypatch):
+    usual = SlowError(1.0, 1000.0, ((0, 9.0, 5000.0),))
+    monkeypatch.setattr(watch, "expected_slow_error", lambda predictor: usual)
+    first, sound = read_recording(folder / "leaves"), read_recording(folder / "sound")
+    watched = watch._begin(folder / "machine.toml", Watching(), first, [sound], lambda stage: None)
+    watched.follow(first)
+    assert (watched.slow.of(0).sigma, watched.slow.of(0).time) == (9.0, 5000.0)
+    assert watched._filter.slow_sigma.tolist() == [9.0]
