@@ -120,11 +120,15 @@ class BaseRun:
 
     def state_changes(self, start: Array, end: Array) -> Array:
         """Changes of the states (G + 1, r, m) that follow from loads (G, r, m) at both ends of the steps."""
-        forcing = np.empty_like(start)
+        return self.run.tangents(self.forcing(start, end), self.tracks)
+
+    def forcing(self, start: Array, end: Array) -> Array:
+        """Changes of the states within each step (G, r, m) by loads (G, r, m) at both its ends."""
+        found = np.empty_like(start)
         for key, rows in self.run.groups.items():
             propagator = self.run.propagators[key]
-            forcing[rows] = propagator.from_start @ start[rows] + propagator.from_end @ end[rows]
-        return self.run.tangents(forcing, self.tracks)
+            found[rows] = propagator.from_start @ start[rows] + propagator.from_end @ end[rows]
+        return found
 
     def place_temperature(self, place: str) -> Array:
         """Mean temperature of a place at the grid, (G + 1,) K."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -11,12 +12,13 @@ from numpy.typing import NDArray
 from spindle_fem.errors import SpecError
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import NO_VALUES, run_name
-from spindle_fem.inference.drive_steps import coarse_drive
+from spindle_fem.inference.drive_steps import centred, coarse_drive
+from spindle_fem.inference.gap_misdescriptions import heat_over_steps
 from spindle_fem.inference.heat_misdescriptions import clock_change
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import direction_columns, misdescriptions_of
 from spindle_fem.inference.observations import Observation, observe
-from spindle_fem.inference.open_events import carried_on
+from spindle_fem.inference.open_events import carried_on, opened_by_gaps, opened_by_rows
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.predictor import STEP, Predictor
 from spindle_fem.inference.structural_misdescriptions import StructuralChange, model_with_directions
@@ -25,9 +27,12 @@ from spindle_fem.model.reduced.drive import Drive
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.reduced_transient import TransientRun
 from spindle_fem.model.reduced.run_start import Start
-from spindle_fem.recordings.align import Recording
+from spindle_fem.recordings.align import GAP_STEPS, Recording
 
 Array = NDArray[np.float64]
+
+# Steps of a network's sources that say how their heat varies.
+REMEMBERED = 2000
 
 
 def require_no_memory(effects: ActiveEffects) -> None:
@@ -59,11 +64,15 @@ class _Piece(Predictor):
         self._begun = begun
         super().__init__(fast, [piece], effects=effects, drives=[_drive_of(fast, piece)])
 
-    def changes_by_open(self, base: BaseRun, begun: Array) -> tuple[Array, Array]:
-        """Changes by what rows and gaps leave open, as :func:`carried_on` gives them; none of a network."""
+    def changes_by_open(self, base: BaseRun, begun: Array, earlier: Array) -> tuple[Array, Array]:
+        """Changes by what rows and gaps leave open, as :func:`carried_on` gives them.
+
+        ``earlier`` is what :func:`opened_by_gaps` takes, of a network.
+        """
         if self.is_network:
-            return np.zeros((self.drives[0].grid.size, base.channels, 1)), begun
-        return carried_on(base, begun, self.unread_jumps[0], self._hidden[0])
+            opened = opened_by_gaps(base, earlier)
+            return carried_on(base, begun, np.zeros(opened.shape[:2]), opened)
+        return carried_on(base, begun, *opened_by_rows(base, self.unread_jumps[0], self._hidden[0]))
 
     def start(
         self, number: int, values: Mapping[str, float] = NO_VALUES, derivatives: Sequence[str] = ()
@@ -81,7 +90,8 @@ def _drive_of(fast: FastModel, piece: Recording) -> Drive:
     if fast.network is None:
         drive = coarse_drive(fast.spec, piece, STEP)
     else:
-        drive = fast.inputs.drive(piece, largest_step=np.inf)
+        # Within a gap rows as usual, so that heat that nobody saw may come and go in it.
+        drive = centred(fast.inputs.drive(piece, largest_step=GAP_STEPS * piece.usual_spacing), piece)
     return replace(drive, times=drive.grid)
 
 
@@ -106,11 +116,18 @@ class ContinuedRun:
     ----------
     effects : ActiveEffects
         What the definition switches on, none with a memory.
+
+    Attributes
+    ----------
+    heat : deque of (s,) ndarray, [W]
+        Of every source over each of the last steps, but for pieces throughout which nothing changed: how much
+        a machine may have done in a gap is seen from when it works.
     """
 
     def __init__(self, fast: FastModel, effects: ActiveEffects) -> None:
         require_no_memory(effects)
         self.fast, self.effects = fast, effects
+        self.heat: deque[Array] = deque(maxlen=REMEMBERED)
         self.restart()
 
     def restart(self) -> None:
@@ -167,7 +184,11 @@ class ContinuedRun:
         base = BaseRun(predictor, 0, values)
         self.begun, self._run = _end_of(predicted, names), predicted.run
         self._misdescribed(predictor, base, names).pass_on(0, predicted, values, (), names)
-        opened, self._open = predictor.changes_by_open(base, self._open)
+        earlier = np.reshape(self.heat, (len(self.heat), base.run.friction_start.shape[1]))
+        opened, self._open = predictor.changes_by_open(base, self._open, earlier)
+        heat = heat_over_steps(base.run)
+        if np.ptp(heat, axis=0).any():
+            self.heat += list(heat)
         predicted.temperature[:] += opened[:, :, 0]
         fresh = np.ones(piece.times.size, dtype=bool)
         fresh[0] = False

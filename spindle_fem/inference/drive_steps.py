@@ -33,7 +33,7 @@ INLET_STEP = 0.5
 SETTLING, SHORT_STEP, SMALL_CHANGE = 120.0, 20.0, 0.02
 
 
-def _centred(fine: Drive, recording: Recording) -> Drive:
+def centred(fine: Drive, recording: Recording) -> Drive:
     """The drive with changes that fell into gaps put amid them instead of at their ends."""
     usual = recording.usual_spacing
     held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
@@ -50,7 +50,7 @@ def _centred(fine: Drive, recording: Recording) -> Drive:
 
 def coarse_drive(spec, recording: Recording, step: float) -> Drive:
     """Inputs on steps from change to change, none longer than ``step``, short about changes."""
-    fine = _centred(drive_of_recording(spec, recording), recording)
+    fine = centred(drive_of_recording(spec, recording), recording)
     begin, finish = fine.grid[0], fine.grid[-1]
     beside = covariate_columns(fine.names)
     inputs = np.setdiff1d(np.arange(len(fine.names)), beside)

@@ -13,6 +13,8 @@ from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.misdescription import Change, Misdescription
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.recording_gaps import long_spacings
+from spindle_fem.model.reduced.reduced_transient import TransientRun
+from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
 
@@ -64,48 +66,73 @@ def gap_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
     """
     if not predictor.is_network:
         return
-    network = predictor.fast.network
-    for number, recording in enumerate(predictor.recordings):
-        held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
-        rows = [i for i, name in enumerate(network.source_input) if name is not None and held.get(name)]
-        spans, changes = long_spacings(recording), recording.unseen_changes
-        if not rows or not (spans or changes):
-            continue
-        run = predictor.transient(number, {})
-        heat = 0.5 * (run.friction_start + run.friction_end)
-        noise = float(np.min(recording.sigma))
-        for row in rows:
-            source = network.source_names[row]
-            least = LEAST_RISE * noise * float(network.capacity[network.source_node[row]])
-            modes = _modes_in(heat[:, row], run.drive.grid, spans, least)
-            for gap, order, first, size, course in modes:
-                yield Misdescription(
-                    f"gap.{source}.{gap}.{order}",
-                    f"heat of {source} within a gap",
-                    "W",
-                    size,
-                    f"heat of {source} within the gap from {spans[gap][0]:.0f} s, beside what its input was "
-                    f"before and after: mode {order}",
-                    HeatWithinGap(source, first, tuple(course.tolist())),
-                    number,
-                )
-            for begin, end, first, size, course in _changes_in(
-                heat[:, row],
-                run.drive.grid,
-                [span for name, *span in changes if name == network.source_input[row]],
-                spans,
-                least,
-            ):
-                yield Misdescription(
-                    f"change.{source}.{begin:.0f}",
-                    f"instant at which heat of {source} changed",
-                    "W",
-                    size,
-                    f"heat of {source} between {begin:.0f} s and {end:.0f} s, readings of its input between "
-                    "which it changed, beside a change amid them",
-                    HeatWithinGap(source, first, tuple(course.tolist())),
-                    number,
-                )
+    for number in range(len(predictor.recordings)):
+        if _held_sources(predictor, number) and has_unread(predictor.recordings[number]):
+            yield from unread_heat(predictor, number, predictor.transient(number, {}))
+
+
+def has_unread(recording: Recording) -> bool:
+    """Whether inputs may have done in a recording what none of its rows shows."""
+    return bool(long_spacings(recording) or recording.unseen_changes)
+
+
+def _held_sources(predictor: Predictor, number: int) -> list[int]:
+    """Sources of a network that follow a held input of a recording."""
+    recording = predictor.recordings[number]
+    held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
+    return [i for i, name in enumerate(predictor.fast.network.source_input) if held.get(name)]
+
+
+def unread_heat(
+    predictor: Predictor, number: int, run: TransientRun, earlier: Array | None = None
+) -> Iterator[Misdescription]:
+    """Directions of one recording, by the heat of a run of it.
+
+    Parameters
+    ----------
+    run : TransientRun
+    earlier : (n, s) ndarray, [W], optional
+        Heat of every source over as many steps before the recording, from which is also seen how it varies.
+    """
+    network, recording = predictor.fast.network, predictor.recordings[number]
+    heat, grid, before = heat_over_steps(run), run.drive.grid, 0
+    if earlier is not None:
+        before = len(earlier)
+        heat = np.concatenate((earlier, heat))
+        grid = np.concatenate((grid[0] - recording.usual_spacing * np.arange(before, 0, -1), grid))
+    spans, changes = long_spacings(recording), recording.unseen_changes
+    noise = float(np.min(recording.sigma))
+    for row in _held_sources(predictor, number):
+        source = network.source_names[row]
+        least = LEAST_RISE * noise * float(network.capacity[network.source_node[row]])
+        for gap, order, first, size, course in _modes_in(heat[:, row], grid, spans, least):
+            yield Misdescription(
+                f"gap.{source}.{gap}.{order}",
+                f"heat of {source} within a gap",
+                "W",
+                size,
+                f"heat of {source} within the gap from {spans[gap][0]:.0f} s, beside what its input was "
+                f"before and after: mode {order}",
+                HeatWithinGap(source, first - before, tuple(course.tolist())),
+                number,
+            )
+        own = [span for name, *span in changes if name == network.source_input[row]]
+        for begin, end, first, size, course in _changes_in(heat[:, row], grid, own, spans, least):
+            yield Misdescription(
+                f"change.{source}.{begin:.0f}",
+                f"instant at which heat of {source} changed",
+                "W",
+                size,
+                f"heat of {source} between {begin:.0f} s and {end:.0f} s, readings of its input between "
+                "which it changed, beside a change amid them",
+                HeatWithinGap(source, first - before, tuple(course.tolist())),
+                number,
+            )
+
+
+def heat_over_steps(run: TransientRun) -> Array:
+    """Mean heat of every source over every step of a run, (G, s) W."""
+    return 0.5 * (run.friction_start + run.friction_end)
 
 
 def _changes_in(

@@ -1,8 +1,9 @@
 """Information of readings beyond those before them: a Kalman filter over parameters and slow errors.
 
-Unknown are the machine's coordinates (in units of their priors), what rows and gaps leave open, one slow
-error per channel and the zero of every displacement sensor. A reading is the prediction, plus its derivatives
-times the departure of the first two, plus the slow error, plus white noise, of a displacement plus the zero.
+Unknown are the machine's coordinates (in units of their priors), what rows and gaps leave open, the slow
+errors of every channel and the zero of every displacement sensor. A reading is the prediction, plus its
+derivatives times the departure of the first two, plus the slow errors, plus white noise, of a displacement
+plus the zero.
 As long as the machine is as its model and the noise as stated, the differences between readings and what
 those before them lead to expect are independent from instant to instant, of known spread.
 
@@ -36,25 +37,37 @@ class InnovationFilter:
         Of every channel, K or µm.
     relative : sequence of int
         The d channels with an unknown zero: displacements. Their first reading sets it and says nothing else.
+    beside : sequence of (int, SlowError)
+        Further slow errors, and of which channel each is.
 
     Attributes
     ----------
-    mean : (p + e + c + d,) ndarray
+    mean : (p + e + s + d,) ndarray
         Departures of the coordinates, then of what is open, slow errors [K, µm], zeros [µm].
-    covariance : (p + e + c + d, p + e + c + d) ndarray
+    covariance : (p + e + s + d, p + e + s + d) ndarray
     open : int
         Number e of what rows and gaps left open.
     slow_sigma : (c,) ndarray, [K, µm]
-        Usual size of the slow errors.
+        Usual size of the slow errors of every channel together.
     """
 
-    def __init__(self, covariance: Array, slow: Sequence[SlowError], relative: Sequence[int] = ()) -> None:
-        self.slow_sigma = np.array([item.sigma for item in slow])
-        self._time = np.array([item.time for item in slow])
+    def __init__(
+        self,
+        covariance: Array,
+        slow: Sequence[SlowError],
+        relative: Sequence[int] = (),
+        beside: Sequence[tuple[int, SlowError]] = (),
+    ) -> None:
+        every = [*enumerate(slow), *beside]
+        self._sigma = np.array([item.sigma for _, item in every])
+        self._time = np.array([item.time for _, item in every])
+        # Which slow errors a channel reads, (c, s).
+        self._reads = np.arange(len(slow))[:, None] == [channel for channel, _ in every]
+        self.slow_sigma = np.sqrt(self._reads @ self._sigma**2)
         self._own, self.open = len(covariance), 0
         self._zero = {channel: place for place, channel in enumerate(relative)}
         self._known = np.array([channel not in self._zero for channel in range(len(slow))])
-        variances = np.concatenate((self.slow_sigma**2, np.full(len(relative), ZERO_SIGMA**2)))
+        variances = np.concatenate((self._sigma**2, np.full(len(relative), ZERO_SIGMA**2)))
         size = len(covariance) + len(variances)
         self.mean = np.zeros(size)
         self.covariance = np.zeros((size, size))
@@ -64,7 +77,7 @@ class InnovationFilter:
     @property
     def _errors(self) -> slice:
         first = self._own + self.open
-        return slice(first, first + len(self.slow_sigma))
+        return slice(first, first + len(self._sigma))
 
     def open_further(self, number: int) -> None:
         """Begin with further numbers that rows and gaps leave open, each of unit variance."""
@@ -86,7 +99,7 @@ class InnovationFilter:
     @property
     def slow_errors(self) -> Array:
         """Estimated slow error of every channel, (c,) K or µm."""
-        return self.mean[self._errors]
+        return self._reads @ self.mean[self._errors]
 
     @property
     def zeros(self) -> Array:
@@ -122,14 +135,14 @@ class InnovationFilter:
         self.covariance[errors] *= kept[:, None]
         self.covariance[:, errors] *= kept
         diagonal = np.arange(errors.start, errors.stop)
-        self.covariance[diagonal, diagonal] += self.slow_sigma**2 * (1.0 - kept**2)
+        self.covariance[diagonal, diagonal] += self._sigma**2 * (1.0 - kept**2)
         read = np.flatnonzero(np.isfinite(residual))
         scaled = np.full(len(residual), np.nan)
         if not read.size:
             return scaled
         observes = np.zeros((read.size, len(self.mean)))
         observes[:, : errors.start] = slopes[read]
-        observes[np.arange(read.size), errors.start + read] = 1.0
+        observes[:, errors] = self._reads[read]
         fresh = ~self._known[read]
         for row, channel in enumerate(read.tolist()):
             if channel in self._zero:

@@ -15,6 +15,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from spindle_fem.inference import tuned
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.robust_size import huber
 from spindle_fem.model.lumped.thermal_network import ThermalNetwork
 from spindle_fem.recordings.align import Recording
@@ -66,6 +67,33 @@ def sampling_errors(network: ThermalNetwork, power: Array) -> Array:
 def own_times(network: ThermalNetwork) -> Array:
     """Time constant of every node by itself, (n_nodes,) s."""
     return network.capacity / np.maximum(np.diag(network.conductance_matrix())[: network.n_nodes], 1e-12)
+
+
+def sampled_errors(
+    network: ThermalNetwork, powers: Sequence[Array], channels: Sequence[str]
+) -> tuple[tuple[int, SlowError], ...]:
+    """Errors of channels by what rarely read inputs did unseen, each with the time of its node.
+
+    Parameters
+    ----------
+    powers : sequence of (n_sources,) ndarray
+        :func:`unseen_power` of each recording; the largest counts.
+    channels : sequence of str
+        Node of every channel.
+
+    Returns
+    -------
+    tuple of (int, SlowError)
+        Of the channels that any reaches.
+    """
+    beside = np.max([sampling_errors(network, power) for power in powers], axis=0)
+    nodes = [network.node_names.index(name) for name in channels]
+    times = own_times(network)
+    return tuple(
+        (channel, SlowError(float(beside[node]), float(times[node])))
+        for channel, node in enumerate(nodes)
+        if beside[node] > 0.0
+    )
 
 
 def left_over_noise(

@@ -292,3 +292,7 @@ STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 4.0, 1.0, 2.0
 # Time over which what readings taught of the machine's coordinates is forgotten again, s: errors of structure
 # that come and go with the operating conditions must not make a parameter seem known to any precision.
 FORGETTING_TIME = 86400.0
+# Share by which the heat of a network's source by a power of what switches within rows differs from its law
+# for some time [s], one standard deviation: the mean of a power is another than the power of a mean, and
+# programmes differ. (A third of the time on within rows is twice the heat at an exponent of 5/3.)
+SOURCE_WANDER, WANDER_TIME = 0.3, 3600.0

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import copy
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.inference import tuned
-from spindle_fem.inference.belief import Belief, Coordinate
 from spindle_fem.inference.continued_run import ContinuedRun
-from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, OF_ONE_RECORDING, START_PREFIX
 from spindle_fem.inference.cumulative_sums import CumulativeSums, spread_of_sound
+from spindle_fem.inference.followed_coordinates import FollowedCoordinates
 from spindle_fem.inference.innovations import InnovationFilter
 from spindle_fem.inference.missing_heat import conditions_of
 from spindle_fem.inference.observations import Observation
-from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.prepared_problem import Calibrated, start_coordinates
+from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.recordings.align import LONG_GAP_SECONDS, LONG_GAP_STEPS, Recording
 from spindle_fem.recordings.recording_window import piece_of
 
@@ -36,8 +33,6 @@ STILL_OUT = 3.0
 FADED = 3.0
 # Instants of one piece: the model is linearised anew after each.
 PIECE_INSTANTS = 60
-# Coordinates of the recording itself that are followed: temperatures at its start, its clocks.
-_OWN_HERE = (START_PREFIX, MISDESCRIBED_IN_PREFIX)
 # Moments and events that rows and gaps leave open, of some hours of work: what earlier ones did faded.
 MOST_OPEN = 60
 # Rows whose inputs differ by more than this share of the largest are amid a change: no piece ends there.
@@ -93,6 +88,10 @@ class WatchedMachine:
         Readings are averaged over it.
     alarms : float
         False alarms a month.
+    beside : sequence of (int, SlowError)
+        Further slow errors of channels, which no calibration tells of.
+    wandering : sequence of str
+        As :class:`FollowedCoordinates` takes it.
 
     Attributes
     ----------
@@ -103,14 +102,21 @@ class WatchedMachine:
     """
 
     def __init__(
-        self, run: ContinuedRun, known: Calibrated, white: Array, *, width: float, alarms: float
+        self,
+        run: ContinuedRun,
+        known: Calibrated,
+        white: Array,
+        *,
+        width: float,
+        alarms: float,
+        beside: Sequence[tuple[int, SlowError]] = (),
+        wandering: Sequence[str] = (),
     ) -> None:
         self.run, self.slow, self.white, self.width = run, known.slow, white, width
-        self._alarms = alarms
+        self._alarms, self._beside, self._wandering = alarms, beside, wandering
         self.used = -np.inf
-        self.coordinates, self._usual, self._prior = _own_part(known.belief)
-        self.position, self._covariance = self._usual.copy(), self._prior.copy()
-        self.sums = self._new_sums()
+        self.coordinates = FollowedCoordinates(known.belief, wandering)
+        self.sums = CumulativeSums(len(white), MONTH / width / alarms, SOONER)
         self.state = AS_MODELLED
         self._filter: InnovationFilter | None = None
         self._channels: tuple[str, ...] = ()
@@ -123,18 +129,23 @@ class WatchedMachine:
         self.spread = 1.0
         self._numbers: deque[Array] = deque(maxlen=MOST_NUMBERS)
 
-    def _new_sums(self) -> CumulativeSums:
-        return CumulativeSums(len(self.white), MONTH / self.width / self._alarms, SOONER)
+    def learn_spread(self, sound: Sequence[tuple[Calibrated, Recording]]) -> None:
+        """Take the spread of innovations from recordings with nothing missing, of whatever channels.
 
-    def learn_spread(self, sound: Sequence[Recording]) -> None:
-        """Take the spread of innovations from recordings with nothing missing, of whatever channels."""
+        Each with what is known of the machine to follow it with.
+        """
         numbers = []
-        for recording in sound:
-            trial = copy.copy(self)
-            trial.run = ContinuedRun(self.run.fast, self.run.effects)
-            trial.position, trial.white = self.position.copy(), white_noise(recording)
-            trial.sums, trial._away = trial._new_sums(), np.zeros(len(trial.white))
-            trial._past, trial._numbers = deque(maxlen=REMEMBERED), deque(maxlen=MOST_NUMBERS)
+        for known, recording in sound:
+            trial = WatchedMachine(
+                ContinuedRun(self.run.fast, self.run.effects),
+                known,
+                white_noise(recording),
+                width=self.width,
+                alarms=self._alarms,
+                beside=self._beside,
+                wandering=self._wandering,
+            )
+            trial.run.heat = self.run.heat
             trial.follow(recording, to_end=True)
             numbers += trial._numbers
         if numbers:
@@ -143,25 +154,17 @@ class WatchedMachine:
             self.spread = spread_of_sound(np.array(padded))
 
     # ------------------------------------------------------------------ coordinates
-    @property
-    def _values(self) -> dict[str, float]:
-        return {c.name: c.at(u) for c, u in zip(self.coordinates, self.position, strict=True)}
-
     def _begin(self, piece: Recording) -> None:
         """Begin with a piece, at the start or after a long gap: temperatures are found from its readings."""
-        own = len(self._usual)
-        starts = tuple(c for c in start_coordinates(self.run.begins(piece)) if c.name.startswith(_OWN_HERE))
-        size = own + len(starts)
-        covariance = np.eye(size)
-        covariance[:own, :own] = self._covariance[:own, :own]
-        self.coordinates = (*self.coordinates[:own], *starts)
-        self.position = np.append(self.position[:own], np.zeros(len(starts)))
+        self.coordinates.begin(start_coordinates(self.run.begins(piece)))
         self.run.restart()
         self._kelvins, every = piece.temperature_count, len(self.white)
         slow = [
             self.slow.of(channel if channel < self._kelvins else channel - every) for channel in range(every)
         ]
-        self._filter = InnovationFilter(covariance, slow, range(self._kelvins, every))
+        self._filter = InnovationFilter(
+            self.coordinates.covariance, slow, range(self._kelvins, every), self._beside
+        )
 
     # ------------------------------------------------------------------ following
     def pass_over(self, piece: Recording) -> None:
@@ -171,7 +174,7 @@ class WatchedMachine:
         """
         self.used = float(piece.times[-1])
         self._begin(piece)
-        *_, opened = self.run.follow(piece, self._values, [c.name for c in self.coordinates], self.width)
+        *_, opened = self.run.follow(piece, self.coordinates.values, self.coordinates.names, self.width)
         self._filter.open_further(opened.shape[2])
 
     def follow(self, recording: Recording, *, to_end: bool = False) -> list[Judgement]:
@@ -223,12 +226,11 @@ class WatchedMachine:
             self.used = float(times[stop - 1])
 
     def _piece(self, piece: Recording) -> list[Judgement]:
-        names = [c.name for c in self.coordinates]
-        predicted, observations, opened = self.run.follow(piece, self._values, names, self.width)
+        known = self.coordinates
+        predicted, observations, opened = self.run.follow(piece, known.values, known.names, self.width)
         self._filter.open_further(opened.shape[2] - self._filter.open)
-        predicted = replace(predicted, sensitivity=np.concatenate((predicted.sensitivity, opened), axis=2))
-        sigma = np.array([*(c.sigma for c in self.coordinates), *([1.0] * opened.shape[2])])
-        instants = _Instants.of(piece, observations, predicted, sigma, self.width)
+        slopes = np.concatenate((known.by_number(predicted.sensitivity), opened), axis=2)
+        instants = _Instants.of(piece, observations, predicted.temperature, slopes, self.width)
         self._channels = piece.temperature_names
         if np.diff(piece.times).max() > self._gap:
             # The history of a machine with geometry during the gap is unknown until it has faded.
@@ -286,20 +288,7 @@ class WatchedMachine:
 
     def _recentre(self, elapsed: float) -> None:
         """Count coordinates from where they are now, and forget a little of what was learned."""
-        own = len(self._usual)
-        kept = np.exp(-elapsed / tuned.FORGETTING_TIME)
-        before = self.position
-        after = before + self._filter.moved()
-        after[:own] = self._usual + kept * (after[:own] - self._usual)
-        lowest, highest = (np.array([getattr(c, end) for c in self.coordinates]) for end in ("low", "high"))
-        self.position = np.clip(after, lowest, highest)
-        moves = (self.position - before) * np.array([c.sigma for c in self.coordinates])
-        self.run.move({c.name: move for c, move in zip(self.coordinates, moves.tolist(), strict=True)})
-        covariance = self._filter.covariance
-        covariance[:own] *= kept
-        covariance[:, :own] *= kept
-        covariance[:own, :own] += (1.0 - kept**2) * self._prior
-        self._covariance = covariance[: len(self.position), : len(self.position)]
+        self.run.move(self.coordinates.move(self._filter.moved(), self._filter.covariance, elapsed))
 
 
 def _past_changes(recording: Recording, stop: int) -> int:
@@ -318,13 +307,6 @@ def _past_changes(recording: Recording, stop: int) -> int:
     if settled.size:
         return stop + int(settled[0])
     return stop if size >= most else size + 1
-
-
-def _own_part(belief: Belief) -> tuple[tuple[Coordinate, ...], Array, Array]:
-    """The machine's own coordinates, their means and covariance."""
-    chosen = [i for i, c in enumerate(belief.coordinates) if not c.name.startswith(OF_ONE_RECORDING)]
-    covariance = np.linalg.inv(belief.root.T @ belief.root)[np.ix_(chosen, chosen)]
-    return tuple(belief.coordinates[i] for i in chosen), belief.mean[chosen], covariance
 
 
 def white_noise(recording: Recording) -> Array:
@@ -366,22 +348,22 @@ class _Instants:
         cls,
         piece: Recording,
         observations: Sequence[Observation],
-        predicted: Prediction,
-        sigma: Array,
+        predicted: Array,
+        by_number: Array,
         width: float,
     ) -> _Instants:
-        """Averages by instant; ``sigma`` are the units of the coordinates."""
+        """Averages by instant of channels (G + 1, c) and their derivatives (G + 1, c, p)."""
         first, channels = float(piece.times[0]), piece.temperature.shape[1]
         owners = [np.floor((item.bins.times - first) / width + 1e-9).astype(int) for item in observations]
         known = np.unique(np.concatenate([np.zeros(0, dtype=int), *owners]))
         residual = np.full((known.size, channels), np.nan)
         number, times = np.ones_like(residual), np.full_like(residual, np.nan)
-        slopes, expected = np.zeros((*residual.shape, sigma.size)), np.full_like(residual, np.nan)
+        slopes, expected = np.zeros((*residual.shape, by_number.shape[2])), np.full_like(residual, np.nan)
         for item, owner in zip(observations, owners, strict=True):
             rows, channel = np.searchsorted(known, owner), item.channel
-            expected[rows, channel] = item.at(predicted.temperature[:, channel])
+            expected[rows, channel] = item.at(predicted[:, channel])
             residual[rows, channel] = item.values - expected[rows, channel]
-            slopes[rows, channel] = item.at(predicted.sensitivity[:, channel]) * sigma
+            slopes[rows, channel] = item.at(by_number[:, channel])
             number[rows, channel], times[rows, channel] = item.bins.number, item.bins.times
         mean = np.nanmean(times, axis=1)
         warm = np.isfinite(expected[:, : piece.temperature_count])

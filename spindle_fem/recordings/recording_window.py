@@ -190,10 +190,11 @@ class RecordingWindow:
 def piece_of(recording: Recording, begin: int, stop: int) -> Recording:
     """The rows ``begin <= k < stop`` as one stretch without a long gap, inputs bridged as each is held."""
     rows = slice(begin, stop)
-    inputs = [recording.input_at(name, recording.times[rows]) for name in recording.input_names]
+    times = recording.times[rows]
+    inputs = [recording.input_at(name, times) for name in recording.input_names]
     return replace(
         recording,
-        times=recording.times[rows],
+        times=times,
         temperature=recording.temperature[rows],
         flags=recording.flags[rows],
         inputs=np.column_stack(inputs) if inputs else recording.inputs[rows],
@@ -201,4 +202,5 @@ def piece_of(recording: Recording, begin: int, stop: int) -> Recording:
         displacements=recording.displacements[rows],
         segments=np.array([[0, stop - begin]], dtype=np.int64),
         whole_spacing=recording.usual_spacing,
+        unseen_changes=tuple(c for c in recording.unseen_changes if times[0] <= c[1] and c[2] <= times[-1]),
     )

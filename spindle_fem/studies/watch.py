@@ -14,10 +14,12 @@ from spindle_fem.definition.load import find_machine, read_definition
 from spindle_fem.definition.network_load import is_network_machine
 from spindle_fem.errors import BadInputError, RecordingError
 from spindle_fem.inference.continued_run import ContinuedRun
+from spindle_fem.inference.input_sampling import sampled_errors
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
-from spindle_fem.inference.opened_machine import open_machine, with_growth
+from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine, with_growth
 from spindle_fem.inference.predictor import LONGEST_BIN, STEP, Predictor
 from spindle_fem.inference.prepared_problem import Calibrated, calibrate, expected_slow_error
+from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.watched_machine import MONTH, Judgement, WatchedMachine, white_noise
 from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.recordings.align import Recording, read_recording
@@ -182,31 +184,72 @@ def _begin(
     """The machine fitted to its calibration recordings, or to the beginning of this one."""
     progress("reduced model")
     stop = int(np.searchsorted(first.times, first.times[0] + how.warm_up, side="right"))
-    sound = [piece_of(first, 0, stop)] if how.warm_up else []
-    opened = open_machine(machine, tuple(how.overrides), [first], [*calibration, *sound], progress=progress)
+    warm_up = [piece_of(first, 0, stop)] if how.warm_up else []
+    opened = open_machine(machine, tuple(how.overrides), [first], [*calibration, *warm_up], progress=progress)
     opened = with_growth(opened)
-    first, *sound = (_grown(item, opened.fast) for item in (first, *sound))
+    first, *warm_up = (_grown(item, opened.fast) for item in (first, *warm_up))
     run = ContinuedRun(opened.fast, opened.effects)
-    earlier = None
+    begun = run.begins(piece_of(first, 0, first.times.size))
     if opened.calibration:
         progress("calibration")
-        earlier = Predictor(opened.fast, opened.calibration, effects=opened.effects)
-        earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
-    begun = run.begins(piece_of(first, 0, first.times.size))
-    known = calibrate(earlier, begun)
-    # A fit of hours takes up part of the slow error and does not show how far it wanders in a month.
-    known = replace(known, slow=known.slow.no_less_than(expected_slow_error(earlier or begun)))
+    known = _known(opened, opened.calibration, begun)
     watched = WatchedMachine(
         run,
         known,
         white_noise(first),
         width=_width(known, first, opened.is_network),
         alarms=how.alarms,
+        beside=_of_inputs(opened, known, first.probes),
+        wandering=_wandering(opened),
     )
-    watched.learn_spread(opened.calibration)
+    sound = [(known, item) for item in opened.calibration]
+    if opened.is_network and not how.warm_up:
+        # What is coarse shows where the machine works otherwise than in what it was fitted to.
+        sound = [(_known(opened, others, begun), own) for own, others in _halves(opened.calibration)]
+    watched.learn_spread(sound)
     if how.warm_up:
-        watched.pass_over(sound[0])
+        watched.pass_over(warm_up[0])
     return watched
+
+
+def _halves(sound: Sequence[Recording]) -> list[tuple[Recording, list[Recording]]]:
+    """Each half of each recording, and all others."""
+    halves = []
+    for item in sound:
+        middle = item.times.size // 2
+        halves += [piece_of(item, 0, middle), piece_of(item, middle, item.times.size)]
+    return [(own, [other for other in halves if other is not own]) for own in halves]
+
+
+def _known(opened: DiagnosedMachine, sound: Sequence[Recording], begun: Predictor) -> Calibrated:
+    """What recordings with nothing missing tell of the machine; what is known before where there are none."""
+    earlier = None
+    if sound:
+        earlier = Predictor(opened.fast, sound, effects=opened.effects)
+        earlier = with_misdescriptions(earlier, misdescriptions_of(earlier))
+    known = calibrate(earlier, begun)
+    # A fit of hours takes up part of the slow error and does not show how far it wanders in a month.
+    return replace(known, slow=known.slow.no_less_than(expected_slow_error(earlier or begun)))
+
+
+def _wandering(opened: DiagnosedMachine) -> list[str]:
+    """Factors of a network's sources by a power of what switches from row to row, and within rows."""
+    if not opened.is_network:
+        return []
+    network, unseen = opened.fast.network, np.max(opened.unseen, axis=0)
+    sources = zip(network.source_names, network.source_exponent, unseen, strict=True)
+    return [f"gain.{name}" for name, exponent, power in sources if power > 0.0 and exponent != 1.0]
+
+
+def _of_inputs(
+    opened: DiagnosedMachine, known: Calibrated, channels: Sequence[str]
+) -> tuple[tuple[int, SlowError], ...]:
+    """Errors of a network's channels by what its inputs did between their rows; none with geometry."""
+    if not opened.is_network:
+        return ()
+    belief = known.belief
+    fitted = {c.name: c.at(u) for c, u in zip(belief.coordinates, belief.mean, strict=True)}
+    return sampled_errors(opened.fast.inputs.moved(fitted), opened.unseen, channels)
 
 
 def _grown(recording: Recording, fast: FastModel) -> Recording:
