@@ -363,13 +363,13 @@ def _predicts(chosen: Hypothesis, empty: Hypothesis, asked: _Asked, odds: float,
     chance hardly leaves such a machine (``ruled_out``).
     A coarse model leaves more than noise, so that likelihoods exaggerate: for a network the residual
     counts, that of fitted readings too, and sensors' white noise hides less of it. If the fit without effects
-    leaves only noise, likelihoods must say so too, and a set leave clearly less.
+    leaves no more than may be left, likelihoods must say so too, and a set leave clearly less.
     """
     if chosen.heldout is None or empty.heldout is None:
         return True
     left, beyond, gain = asked.left, asked.beyond, _heldout_gain(chosen, empty)
     if asked.coarseness > 1.0:
-        within = max(left(empty.fit), beyond(empty.fit)) <= 1.0
+        within = max(left(empty.fit), beyond(empty.fit)) <= tuned.MOST_LEFT
         least = tuned.LEAST_OF_A_MEMBER if within else tuned.LEAST_IMPROVEMENT
         most = 1.0 - least if within else 1.0 + least
         lower = beyond(chosen.fit) <= (1.0 - least) * beyond(empty.fit)

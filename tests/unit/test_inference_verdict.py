@@ -90,18 +90,22 @@ def test_a_set_is_named_where_fitted_and_held_out_readings_together_speak_for_it
         nothing,
     )
     assert verdict(*alone).verdict == "missing_physics"
-    # a network that leaves no more than the noise must be told clearly better by both
+    # a network that leaves no more than may be left must be told clearly better by both
     for share, lower, higher in ((0.99, "missing_physics", "consistent"), (1.01, "consistent", "consistent")):
-        least = share * (1.0 - tuned.LEAST_OF_A_MEMBER)
-        left = dict.fromkeys(("left", "beyond"), lambda fit, least=least: least if fit.candidates else 1.0)
-        assert verdict(*alone, coarseness=1.1, **left).verdict == lower
-        assert verdict(*better, coarseness=1.1, **left).verdict == higher
+        for most in (1.0, 0.9 * tuned.MOST_LEFT):
+            least = most * share * (1.0 - tuned.LEAST_OF_A_MEMBER)
+            left = dict.fromkeys(
+                ("left", "beyond"), lambda fit, least=least, most=most: least if fit.candidates else most
+            )
+            assert verdict(*alone, coarseness=1.1, **left).verdict == lower
+            assert verdict(*better, coarseness=1.1, **left).verdict == higher
     # the picture that a network gives is coarser: what is left of single readings counts
+    much = 1.1 * tuned.MOST_LEFT
     for share, told in ((0.5, "missing_physics"), (0.99, "consistent")):
-        left = {"beyond": lambda fit, share=share: 1.5 * share if fit.candidates else 1.5}
+        left = {"beyond": lambda fit, share=share: share * much if fit.candidates else much}
         assert verdict(*alone, coarseness=2.0, **left).verdict == told
     worse = {"left": lambda fit: 1.6 if fit.candidates else 1.5}
-    better_later = {"beyond": lambda fit: 0.75 if fit.candidates else 1.5}
+    better_later = {"beyond": lambda fit: 0.5 * much if fit.candidates else much}
     assert verdict(*alone, coarseness=2.0, **better_later, **worse).verdict == "consistent"
     # where readings leave far more than noise, nothing that is known explains it
     assert verdict(*same, left=lambda fit: 3.0).verdict == "unexplained"
