@@ -204,3 +204,9 @@ def piece_of(recording: Recording, begin: int, stop: int) -> Recording:
         whole_spacing=recording.usual_spacing,
         unseen_changes=tuple(c for c in recording.unseen_changes if times[0] <= c[1] and c[2] <= times[-1]),
     )
+
+
+def part_of(recording: Recording, begin: int, stop: int) -> Recording:
+    """The rows ``begin <= k < stop``, with their long gaps."""
+    within = np.clip(recording.segments, begin, stop) - begin
+    return replace(piece_of(recording, begin, stop), segments=within[within[:, 1] > within[:, 0]])

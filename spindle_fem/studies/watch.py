@@ -27,7 +27,7 @@ from spindle_fem.recordings.displaced_readings import with_displacements
 from spindle_fem.recordings.faults_beside import manifest_for
 from spindle_fem.recordings.growing_file import follow_lines
 from spindle_fem.recordings.recordable_names import recordable_names
-from spindle_fem.recordings.recording_window import RecordingWindow, piece_of
+from spindle_fem.recordings.recording_window import RecordingWindow, part_of, piece_of
 from spindle_fem.recordings.smooth_inputs import without_input_noise
 from spindle_fem.units import to_si
 
@@ -203,7 +203,8 @@ def _begin(
         wandering=_wandering(opened),
     )
     sound = [(known, item) for item in opened.calibration]
-    if opened.is_network and not how.warm_up:
+    long = all(item.times.size >= FIRST_ROWS for item in opened.calibration)
+    if opened.is_network and long and not how.warm_up:
         # What is coarse shows where the machine works otherwise than in what it was fitted to.
         sound = [(_known(opened, others, begun), own) for own, others in _halves(opened.calibration)]
     watched.learn_spread(sound)
@@ -217,7 +218,7 @@ def _halves(sound: Sequence[Recording]) -> list[tuple[Recording, list[Recording]
     halves = []
     for item in sound:
         middle = item.times.size // 2
-        halves += [piece_of(item, 0, middle), piece_of(item, middle, item.times.size)]
+        halves += [part_of(item, 0, middle), part_of(item, middle, item.times.size)]
     return [(own, [other for other in halves if other is not own]) for own in halves]
 
 

@@ -412,3 +412,49 @@ def test_a_watch_expects_no_less_than_the_usual_slow_error_of_each_channel(folde
     watched.follow(first)
     assert (watched.slow.of(0).sigma, watched.slow.of(0).time) == (9.0, 5000.0)
     assert watched._filter.slow_sigma == pytest.approx([9.0], rel=1e-2)
+
+
+def test_sources_by_a_power_of_what_switches_within_rows_wander(folder, tmp_path):
+    spindle = ("block", "speed", ("20 W", 0.1), {"reference": "1000 rpm", "exponent": 5.0 / 3.0})
+    text = network_text(
+        "block",
+        {"block": ("2000 J/K", 0.2)},
+        {"block|ambient": ("2 W/K", 0.2)},
+        [("block", "power", ("1 W/W", 0.1)), spindle],
+    )
+    (tmp_path / "machine.toml").write_text(text)
+    frame = heated(4.0).assign(speed=0.0)
+    inputs = INPUTS | {"speed": "speed"}
+    still = read_recording(write_recording(tmp_path / "still", frame, TEMPERATURES, inputs))
+    frame.loc[:, "speed"] = 1000.0 * (np.arange(len(frame)) % 3 == 0)
+    works = read_recording(write_recording(tmp_path / "works", frame, TEMPERATURES, inputs))
+    for recording, wander in ((still, []), (works, ["gain.block.speed"])):
+        opened = open_machine(tmp_path / "machine.toml", (), [recording], [still])
+        assert watch._wandering(opened) == wander
+    known = watch._known(opened, opened.calibration, ContinuedRun(opened.fast, NO_EFFECTS).begins(works))
+    ((channel, error),) = watch._of_inputs(opened, known, works.probes)
+    # Heat that differs from row to row as white noise: P = S gain² / (2 C G), forgotten with C/G.
+    apart, gain, capacity, conductance = 30.0, 20.0, 2000.0, 2.0
+    changes = 2.0 / 3.0  # of the power of the speed, in thousands, from row to row
+    expected = gain * np.sqrt(0.5 * changes * apart / (2.0 * capacity * conductance))
+    assert channel == 0
+    assert error.sigma == pytest.approx(expected, rel=0.3)
+    assert error.time == pytest.approx(capacity / conductance, rel=0.5)
+
+
+def test_each_half_of_what_is_sound_is_followed_by_what_the_others_tell(folder):
+    frame = heated(4.0)
+    frame = frame[(frame.time < 3600.0) | (frame.time > 3.0 * 3600.0)]
+    write_recording(folder / "gap", frame, TEMPERATURES, INPUTS)
+    sound = [read_recording(folder / "sound"), read_recording(folder / "gap")]
+    assert len(sound[1].segments) == 2
+    parts = watch._halves(sound)
+    assert [own.times.size for own, _ in parts] == [360, 360, 119, 120]
+    assert all(len(others) == 3 and not any(own is other for other in others) for own, others in parts)
+    assert [own.segments.tolist() for own, _ in parts[2:]] == [[[0, 119]], [[0, 1], [1, 120]]]
+    # A half may hold a single row before a gap.
+    opened = open_machine(folder / "machine.toml", (), [sound[0]], [])
+    begun = ContinuedRun(opened.fast, NO_EFFECTS).begins(sound[0])
+    belief = watch._known(opened, [parts[3][0]], begun).belief
+    told = {c.name: c.at(u) for c, u in zip(belief.coordinates, belief.mean, strict=True)}
+    assert told["gain.block.power"] / told["conductance.block|ambient"] == pytest.approx(1.0, abs=0.1)
