@@ -66,11 +66,8 @@ def opened_by_gaps(base: BaseRun, earlier: Array) -> Array:
     earlier : (n, s) ndarray, [W]
         Heat of the sources in the steps before, as :func:`unread_heat` takes it.
     """
-    found = (
-        list(unread_heat(base.predictor, 0, base.run, earlier))
-        if has_unread(base.predictor.recordings[0])
-        else []
-    )
+    hides = has_unread(base.predictor.recordings[0])
+    found = list(unread_heat(base.predictor, 0, base.run, earlier)) if hides else []
     loads = np.zeros((len(base.run.drive.steps), base.predictor.fast.model.size, len(found)))
     for index, item in enumerate(found):
         loads[:, :, index] = item.sigma * item.change(base).start

@@ -16,7 +16,7 @@ from spindle_fem.inference.coordinate_names import DIRECTIONS, JUMP_PREFIX, PROB
 from spindle_fem.inference.earlier_readings import EarlierReadings
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
-from spindle_fem.inference.input_sampling import own_times, sampling_errors
+from spindle_fem.inference.input_sampling import sampled_errors
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
@@ -146,15 +146,13 @@ def expected_slow_error(predictor: Predictor) -> SlowError:
     usual = SlowError(unit, times[len(times) // 2])
     if not predictor.unseen:
         return usual
-    network = predictor.fast.inputs.moved({})
-    beside = np.max([sampling_errors(network, power) for power in predictor.unseen], axis=0)
-    settled = own_times(network)
     channels = {}
     for recording in predictor.recordings:
-        for channel, probe in enumerate(recording.probes):
-            node = predictor.fast.inputs.channels.index(probe)
-            time = settled[node] if beside[node] > unit else usual.time
-            channels[channel] = SlowError(float(np.hypot(unit, beside[node])), float(time))
+        sampled = dict(sampled_errors(predictor.fast.inputs.moved({}), predictor.unseen, recording.probes))
+        for channel in range(len(recording.probes)):
+            beside = sampled.get(channel, SlowError(0.0))
+            time = beside.time if beside.sigma > unit else usual.time
+            channels[channel] = SlowError(float(np.hypot(unit, beside.sigma)), time)
     return SlowError.each(channels)
 
 
