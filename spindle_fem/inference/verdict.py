@@ -363,19 +363,18 @@ def _predicts(chosen: Hypothesis, empty: Hypothesis, asked: _Asked, odds: float,
     chance hardly leaves such a machine (``ruled_out``).
     A coarse model leaves more than noise, so that likelihoods exaggerate: for a network the residual
     counts, that of fitted readings too, and sensors' white noise hides less of it. If the fit without effects
-    leaves no more than may be left, likelihoods must say so too, and a set leave clearly less.
+    leaves no more than may be left, likelihoods must say so too, and a set leave clearly less of all readings.
     """
     if chosen.heldout is None or empty.heldout is None:
         return True
     left, beyond, gain = asked.left, asked.beyond, _heldout_gain(chosen, empty)
+    rest, before = (left_of_all(left(fit), beyond(fit)) for fit in (chosen.fit, empty.fit))
     if asked.coarseness > 1.0:
         within = max(left(empty.fit), beyond(empty.fit)) <= tuned.MOST_LEFT
-        least = tuned.LEAST_OF_A_MEMBER if within else tuned.LEAST_IMPROVEMENT
-        most = 1.0 - least if within else 1.0 + least
-        lower = beyond(chosen.fit) <= (1.0 - least) * beyond(empty.fit)
-        enough = gain >= tuned.LEAST_HELDOUT_GAIN or not within
-        return enough and lower and left(chosen.fit) <= most * left(empty.fit)
-    rest, before = (left_of_all(left(fit), beyond(fit)) for fit in (chosen.fit, empty.fit))
+        enough = gain >= tuned.LEAST_HELDOUT_GAIN and rest <= (1.0 - tuned.LEAST_OF_A_MEMBER) * before
+        lower = beyond(chosen.fit) <= (1.0 - tuned.LEAST_IMPROVEMENT) * beyond(empty.fit)
+        kept = left(chosen.fit) <= (1.0 + tuned.LEAST_IMPROVEMENT) * left(empty.fit)
+        return lower and kept and (enough or not within)
     lower = ruled_out or rest <= (1.0 - tuned.LEAST_IMPROVEMENT_DRAWN) * before
     return lower and max(gain, gain + odds) >= tuned.LEAST_HELDOUT_GAIN
 
