@@ -363,7 +363,7 @@ def _predicts(chosen: Hypothesis, empty: Hypothesis, asked: _Asked, odds: float,
     chance hardly leaves such a machine (``ruled_out``).
     A coarse model leaves more than noise, so that likelihoods exaggerate: for a network the residual
     counts, that of fitted readings too, and sensors' white noise hides less of it. If the fit without effects
-    leaves no more than may be left, likelihoods must say so too, and a set leave clearly less of all readings.
+    leaves no more than may be left, likelihoods must say so too, and a set leave clearly less of all.
     """
     if chosen.heldout is None or empty.heldout is None:
         return True
