@@ -69,31 +69,17 @@ def own_times(network: ThermalNetwork) -> Array:
     return network.capacity / np.maximum(np.diag(network.conductance_matrix())[: network.n_nodes], 1e-12)
 
 
-def sampled_errors(
-    network: ThermalNetwork, powers: Sequence[Array], channels: Sequence[str]
-) -> tuple[tuple[int, SlowError], ...]:
-    """Errors of channels by what rarely read inputs did unseen, each with the time of its node.
+def sampled_errors(network: ThermalNetwork, powers: Sequence[Array]) -> dict[str, SlowError]:
+    """Errors of the nodes by what rarely read inputs did unseen, by name, each with the time of its node.
 
     Parameters
     ----------
     powers : sequence of (n_sources,) ndarray
         :func:`unseen_power` of each recording; the largest counts.
-    channels : sequence of str
-        Node of every channel.
-
-    Returns
-    -------
-    tuple of (int, SlowError)
-        Of the channels that any reaches.
     """
     beside = np.max([sampling_errors(network, power) for power in powers], axis=0)
-    nodes = [network.node_names.index(name) for name in channels]
-    times = own_times(network)
-    return tuple(
-        (channel, SlowError(float(beside[node]), float(times[node])))
-        for channel, node in enumerate(nodes)
-        if beside[node] > 0.0
-    )
+    each = zip(network.node_names, beside.tolist(), own_times(network).tolist(), strict=True)
+    return {name: SlowError(sigma, time) for name, sigma, time in each}
 
 
 def left_over_noise(

@@ -146,11 +146,10 @@ def expected_slow_error(predictor: Predictor) -> SlowError:
     usual = SlowError(unit, times[len(times) // 2])
     if not predictor.unseen:
         return usual
-    channels = {}
+    channels, sampled = {}, sampled_errors(predictor.fast.inputs.moved({}), predictor.unseen)
     for recording in predictor.recordings:
-        sampled = dict(sampled_errors(predictor.fast.inputs.moved({}), predictor.unseen, recording.probes))
-        for channel in range(len(recording.probes)):
-            beside = sampled.get(channel, SlowError(0.0))
+        for channel, probe in enumerate(recording.probes):
+            beside = sampled[probe]
             time = beside.time if beside.sigma > unit else usual.time
             channels[channel] = SlowError(float(np.hypot(unit, beside.sigma)), time)
     return SlowError.each(channels)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +41,7 @@ CHANGED = 0.02
 MOST_AMID = 10
 # Innovations by which the spread is judged, at most.
 MOST_NUMBERS = 20_000
+NOTHING_BESIDE: Mapping[str, SlowError] = {}
 # Instants by which heating and cooling are distinguished.
 REMEMBERED = 300
 
@@ -88,8 +89,8 @@ class WatchedMachine:
         Readings are averaged over it.
     alarms : float
         False alarms a month.
-    beside : sequence of (int, SlowError)
-        Further slow errors of channels, which no calibration tells of.
+    beside : mapping of str to SlowError
+        Further slow errors by place of the sensor, which no calibration tells of.
     wandering : sequence of str
         As :class:`FollowedCoordinates` takes it.
 
@@ -109,7 +110,7 @@ class WatchedMachine:
         *,
         width: float,
         alarms: float,
-        beside: Sequence[tuple[int, SlowError]] = (),
+        beside: Mapping[str, SlowError] = NOTHING_BESIDE,
         wandering: Sequence[str] = (),
     ) -> None:
         self.run, self.slow, self.white, self.width = run, known.slow, white, width
@@ -162,8 +163,9 @@ class WatchedMachine:
         slow = [
             self.slow.of(channel if channel < self._kelvins else channel - every) for channel in range(every)
         ]
+        beside = [(i, self._beside[p]) for i, p in enumerate(piece.probes) if p in self._beside]
         self._filter = InnovationFilter(
-            self.coordinates.covariance, slow, range(self._kelvins, every), self._beside
+            self.coordinates.covariance, slow, range(self._kelvins, every), beside
         )
 
     # ------------------------------------------------------------------ following

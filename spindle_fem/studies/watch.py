@@ -199,7 +199,7 @@ def _begin(
         white_noise(first),
         width=_width(known, first, opened.is_network),
         alarms=how.alarms,
-        beside=_of_inputs(opened, known, first.probes),
+        beside=_of_inputs(opened, known),
         wandering=_wandering(opened),
     )
     sound = [(known, item) for item in opened.calibration]
@@ -242,15 +242,13 @@ def _wandering(opened: DiagnosedMachine) -> list[str]:
     return [f"gain.{name}" for name, exponent, power in sources if power > 0.0 and exponent != 1.0]
 
 
-def _of_inputs(
-    opened: DiagnosedMachine, known: Calibrated, channels: Sequence[str]
-) -> tuple[tuple[int, SlowError], ...]:
-    """Errors of a network's channels by what its inputs did between their rows; none with geometry."""
+def _of_inputs(opened: DiagnosedMachine, known: Calibrated) -> dict[str, SlowError]:
+    """Errors of a network's nodes by what its inputs did between their rows; none with geometry."""
     if not opened.is_network:
-        return ()
+        return {}
     belief = known.belief
     fitted = {c.name: c.at(u) for c, u in zip(belief.coordinates, belief.mean, strict=True)}
-    return sampled_errors(opened.fast.inputs.moved(fitted), opened.unseen, channels)
+    return sampled_errors(opened.fast.inputs.moved(fitted), opened.unseen)
 
 
 def _grown(recording: Recording, fast: FastModel) -> Recording:

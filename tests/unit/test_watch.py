@@ -432,12 +432,12 @@ def test_sources_by_a_power_of_what_switches_within_rows_wander(folder, tmp_path
         opened = open_machine(tmp_path / "machine.toml", (), [recording], [still])
         assert watch._wandering(opened) == wander
     known = watch._known(opened, opened.calibration, ContinuedRun(opened.fast, NO_EFFECTS).begins(works))
-    ((channel, error),) = watch._of_inputs(opened, known, works.probes)
+    ((node, error),) = watch._of_inputs(opened, known).items()
     # Heat that differs from row to row as white noise: P = S gain² / (2 C G), forgotten with C/G.
     apart, gain, capacity, conductance = 30.0, 20.0, 2000.0, 2.0
     changes = 2.0 / 3.0  # of the power of the speed, in thousands, from row to row
     expected = gain * np.sqrt(0.5 * changes * apart / (2.0 * capacity * conductance))
-    assert channel == 0
+    assert node == "block"
     assert error.sigma == pytest.approx(expected, rel=0.3)
     assert error.time == pytest.approx(capacity / conductance, rel=0.5)
 
