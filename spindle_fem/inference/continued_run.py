@@ -64,7 +64,7 @@ class _Piece(Predictor):
         self._begun = begun
         super().__init__(fast, [piece], effects=effects, drives=[_drive_of(fast, piece)])
 
-    def changes_by_open(self, base: BaseRun, begun: Array, earlier: Array) -> tuple[Array, Array]:
+    def changes_by_open(self, base: BaseRun, begun: Array, earlier: Sequence[Array]) -> tuple[Array, Array]:
         """Changes by what rows and gaps leave open, as :func:`carried_on` gives them.
 
         ``earlier`` is what :func:`opened_by_gaps` takes, of a network.
@@ -120,8 +120,8 @@ class ContinuedRun:
     Attributes
     ----------
     heat : deque of (s,) ndarray, [W]
-        Of every source over each of the last steps, but for pieces throughout which nothing changed: how much
-        a machine may have done in a gap is seen from when it works.
+        Of every source of a network over each of the last steps, but for pieces throughout which nothing
+        changed: how much a machine may have done in a gap is seen from when it works.
     """
 
     def __init__(self, fast: FastModel, effects: ActiveEffects) -> None:
@@ -184,10 +184,9 @@ class ContinuedRun:
         base = BaseRun(predictor, 0, values)
         self.begun, self._run = _end_of(predicted, names), predicted.run
         self._misdescribed(predictor, base, names).pass_on(0, predicted, values, (), names)
-        earlier = np.reshape(self.heat, (len(self.heat), base.run.friction_start.shape[1]))
-        opened, self._open = predictor.changes_by_open(base, self._open, earlier)
+        opened, self._open = predictor.changes_by_open(base, self._open, self.heat)
         heat = heat_over_steps(base.run)
-        if np.ptp(heat, axis=0).any():
+        if predictor.is_network and np.ptp(heat, axis=0).any():
             self.heat += list(heat)
         predicted.temperature[:] += opened[:, :, 0]
         fresh = np.ones(piece.times.size, dtype=bool)

@@ -58,16 +58,18 @@ def opened_by_rows(
     return np.einsum("grnt,nt->gr", earlier, weights), fresh
 
 
-def opened_by_gaps(base: BaseRun, earlier: Array) -> Array:
+def opened_by_gaps(base: BaseRun, earlier: Sequence[Array]) -> Array:
     """What gaps of a piece leave open of a network: the heat of its sources, (G, r, n) K.
 
     Parameters
     ----------
-    earlier : (n, s) ndarray, [W]
-        Heat of the sources in the steps before, as :func:`unread_heat` takes it.
+    earlier : sequence of n (s,) ndarray, [W]
+        Heat of the sources in the steps before.
     """
-    hides = has_unread(base.predictor.recordings[0])
-    found = list(unread_heat(base.predictor, 0, base.run, earlier)) if hides else []
+    found = []
+    if has_unread(base.predictor.recordings[0]):
+        before = np.reshape(earlier, (len(earlier), base.run.friction_start.shape[1]))
+        found = list(unread_heat(base.predictor, 0, base.run, before))
     loads = np.zeros((len(base.run.drive.steps), base.predictor.fast.model.size, len(found)))
     for index, item in enumerate(found):
         loads[:, :, index] = item.sigma * item.change(base).start
