@@ -56,7 +56,7 @@ COARSE_MESH = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
 # loads must follow the field even for the worst.
 QUIETEST, LOUDEST = 0.02, 0.2
 # First step of a run and after a jump, s: about what its error allows there.
-FIRST_STEP = 30.0
+FIRST_STEP = 60.0
 # Share of the heat that may be missing in a run, for each kelvin of that noise: a tenth of what so coarse a
 # coupling may leave. (Two duty cycles leave a fortieth to a quarter of it.)
 IMBALANCE_PER_KELVIN = 0.01

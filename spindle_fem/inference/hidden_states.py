@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -116,10 +118,20 @@ def _with_zeros(slopes: Array, temperatures: int) -> Array:
     return np.concatenate((slopes, np.broadcast_to(ZERO_SIGMA * zeros, (len(slopes), *zeros.shape))), axis=2)
 
 
-def intervals_of(on: NDArray[np.bool_], grid: Array) -> list[tuple[float, float]]:
-    """Intervals of steps that are on, from values (T,) and the ends of the steps (T + 1,) [s]."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], on, [False])).astype(int)))
-    return [(float(grid[a]), float(grid[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+def intervals_of(level: Array, grid: Array) -> list[tuple[float, float]]:
+    """Intervals at one level, none of 0, from the levels of steps (T,) and their ends (T + 1,) [s]."""
+    return [(float(grid[a]), float(grid[b])) for a, b in _runs(level)]
+
+
+def levels_of(level: Array) -> list[int]:
+    """Level in each of these intervals."""
+    return [int(level[a]) for a, _ in _runs(level)]
+
+
+def _runs(level: Array) -> list[tuple[int, int]]:
+    """First step of every run of equal levels that are not 0, and that after its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], level.astype(int), [0]))))
+    return [(a, b) for a, b in pairwise(edges.tolist()) if level[a] > 0]
 
 
 def conditions_of_inputs(base: BaseRun) -> dict[str, NDArray[np.int64]]:

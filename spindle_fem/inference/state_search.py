@@ -22,6 +22,7 @@ from spindle_fem.inference.hidden_states import (
     answer_of,
     conditions_of_inputs,
     intervals_of,
+    levels_of,
     readings_about,
     without,
 )
@@ -32,7 +33,15 @@ from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.missing_heat import Pattern, stretches
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.switching_model import QUICK, THOROUGH, Chain, Course, ReadingFilter, find_course
+from spindle_fem.inference.switching_model import (
+    QUICK,
+    THOROUGH,
+    Chain,
+    Course,
+    ReadingFilter,
+    find_course,
+    with_another_level,
+)
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
@@ -181,14 +190,15 @@ def _inferred(
         return None
     if not switched:
         held = _held_out(problem.predictor, place.recording)
-        again = replace(again, on=np.where(held, again.on, course.on))
-        if np.array_equal(again.on, course.on):
+        again = replace(again, level=np.where(held, again.level, course.level))
+        if np.array_equal(again.level, course.level):
             return None
-    intervals = intervals_of(again.on, drive.grid)
+    intervals = intervals_of(again.level, drive.grid)
     middle = 0.5 * (drive.grid[1:] + drive.grid[:-1])
     within = [(middle > start) & (middle < end) for start, end in intervals]
     probability = tuple(float(again.probability[rows].mean()) for rows in within)
-    state = InferredState(_candidate(search, place, intervals, again), probability)
+    own = _candidate(search, place, intervals, again.shares_at(levels_of(again.level)), again.size)
+    state = InferredState(own, probability)
     length = np.diff(drive.grid)
     on = np.where(again.on, length, 0.0)
     conditions = conditions_of_inputs(BaseRun(problem.predictor, place.recording, *_bare(fit, candidate)))
@@ -223,7 +233,7 @@ def _as_state(
     middle = 0.5 * (grid[1:] + grid[:-1])
     on = np.any([(middle > start) & (middle < end) for start, end in intervals], axis=0)
     chain = Chain.usual(np.zeros(len(on), dtype=np.int64))
-    return place, Course(on, on.astype(float), float(np.mean(sizes)), 0.0, 0.0, 0.0, chain)
+    return place, Course(on.astype(np.int64), on.astype(float), float(np.mean(sizes)), 0.0, 0.0, 0.0, chain)
 
 
 def _held_out(predictor: Predictor, number: int) -> NDArray[np.bool_]:
@@ -237,8 +247,8 @@ def _held_out(predictor: Predictor, number: int) -> NDArray[np.bool_]:
 def _on_steps(course: Course, grid: Array, other: Array) -> Course:
     """A course on other steps, from the ends (T + 1,) of its own and (U + 1,) of those, s."""
     middle = 0.5 * (other[1:] + other[:-1])
-    row = np.clip(np.searchsorted(grid, middle, side="right") - 1, 0, len(course.on) - 1)
-    return replace(course, on=course.on[row], probability=course.probability[row])
+    row = np.clip(np.searchsorted(grid, middle, side="right") - 1, 0, len(course.level) - 1)
+    return replace(course, level=course.level[row], probability=course.probability[row])
 
 
 def states_on_rows(
@@ -257,11 +267,12 @@ def states_on_rows(
         if name not in search.courses:
             found[name] = state
             continue
-        place, course, _ = search.courses[name]
+        place = search.courses[name][0]
         width = BLUR * float(np.median(np.diff(averaged.drives[place.recording].grid)))
         intervals = place.effect.intervals(state.candidate, {})
-        own = replace(course, size=state.candidate.reference)
-        found[name] = replace(state, fitted=_candidate(search, place, intervals, own, width))
+        shares = place.effect.sizes(state.candidate, {name: 1.0})
+        size = state.candidate.reference
+        found[name] = replace(state, fitted=_candidate(search, place, intervals, shares, size, width))
     return found
 
 
@@ -275,13 +286,15 @@ def settle_best(search: Search) -> None:
 
     Also without each of the others, and as another effect at the same spot: whether heat or cooling switches
     shows in how its power follows temperatures, which what else is missing hides while a state is first
-    looked for. What the best set has in intervals may be a state that was hidden so far.
+    looked for. And at one level more. What the best set has in intervals may be a state that was hidden so
+    far.
     """
     fit = search.ranked()[0].fit
     for candidate in fit.candidates:
         if search.is_hidden_state(candidate):
             if len(fit.candidates) > 1:
                 _settle_again(search, fit, candidate)
+            _settle_levels(search, fit, candidate)
         elif search.in_intervals(candidate) and search.problem.predictor.is_network:
             _settle_intervals(search, fit, candidate)
 
@@ -301,6 +314,22 @@ def _settle_again(search: Search, fit: Fit, candidate: Candidate) -> None:
     twin = _twin(search, fit, place, candidate, tuned.FAIR_SHARE * again.log_evidence)
     if twin is not None:
         settle(search, fit, *twin, candidate)
+
+
+def _settle_levels(search: Search, fit: Fit, candidate: Candidate) -> None:
+    """The state of a set at one level more, where that is likelier."""
+    known = search.courses[candidate.amplitude]
+    place, course, _ = known
+    about = _about(search.problem, fit, place.recording, candidate)
+    if about is None:
+        return
+    spread = 2.0 * max(_usual(search, place), course.size)
+    more = with_another_level(answer_of(about[0], place.pattern), about[1], course, spread, QUICK)
+    if more is not None:
+        before = search.found.get(identity(fit.candidates))
+        settle(search, fit, place, more, candidate)
+        if search.found.get(identity(fit.candidates)) is before:
+            search.courses[candidate.amplitude] = known
 
 
 def _about(
@@ -378,16 +407,17 @@ def settle(
     best: Hypothesis | None = None
     for _ in range(tuned.COURSE_ROUNDS):
         grid = problem.predictor.drives[place.recording].grid
-        intervals = intervals_of(course.on, grid)
-        if len(intervals) < FEWEST:
+        if len(intervals_of(course.on, grid)) < FEWEST:
             return
-        candidate = _candidate(search, place, intervals, course)
+        shares = course.shares_at(levels_of(course.level))
+        candidate = _candidate(search, place, intervals_of(course.level, grid), shares, course.size)
         factor = values.get(candidate.sized_by, 1.0)
         start = values | {amplitude_name(candidate): course.size / factor}
         fitted = search.problem.simulated((*rest, candidate), start)
         if fitted is None:
             return
-        paid = course.log_choice + len(course.chain.begin) * float(np.log(len(course.on)))
+        numbers = len(course.chain.begin) + len(course.shares) - 1
+        paid = course.log_choice + numbers * float(np.log(len(course.level)))
         known = search.courses.get(candidate.amplitude)
         search.courses[candidate.amplitude] = place, course, paid / (course.log_evidence + course.log_choice)
         hypothesis = search.hypothesis(fitted)
@@ -401,7 +431,7 @@ def settle(
             break
         values = fitted.values
         again = course_about(search, fitted, place, candidate, course)
-        if again is None or np.array_equal(again.on, course.on):
+        if again is None or np.array_equal(again.level, course.level):
             break
         course = again
     earlier = search.found.get(identity(best.fit.candidates))
@@ -427,9 +457,11 @@ def course_about(
     usual = _usual(search, place)
     size = fit.values[amplitude_name(candidate)] * fit.values.get(candidate.sized_by, 1.0)
     chain = best_chain(base, course.chain, course)
-    return find_course(
-        answer_of(base, place.pattern), readings, chain, size, max(2.0 * usual, 2.0 * size), effort
-    )
+    answer, spread = answer_of(base, place.pattern), max(2.0 * usual, 2.0 * size)
+    found = find_course(answer, readings, chain, size, spread, effort, course.shares)
+    if found is None and len(course.shares) > 1:
+        found = find_course(answer, readings, chain, size, spread, effort)
+    return found
 
 
 def best_chain(base: BaseRun, chain: Chain, course: Course) -> Chain:
@@ -452,9 +484,15 @@ def _candidate(
     search: Search,
     place: StatePlace,
     intervals: Sequence[tuple[float, float]],
-    course: Course,
+    shares: Sequence[float],
+    size: float,
     blurred: float = 0.0,
 ) -> Candidate:
-    found = place.effect.over(search.view, place.pattern.spot, intervals, course=STATES, blurred=blurred)
+    """Something on in intervals at these shares of a size, W or W/K."""
+    shares = shares if any(share != 1.0 for share in shares) else ()
+    found = place.effect.over(
+        search.view, place.pattern.spot, intervals, course=STATES, sizes=shares, blurred=blurred
+    )
     several = len(search.problem.predictor.recordings) > 1
-    return replace(found, reference=max(course.size, 1e-3), recording=place.recording if several else None)
+    recording = place.recording if several else None
+    return replace(found, reference=max(size, 1e-3), recording=recording)

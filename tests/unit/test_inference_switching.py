@@ -12,15 +12,18 @@ from spindle_fem.inference.switching_model import (
     ReadingFilter,
     Readings,
     find_course,
-    size_of,
+    sizes_of,
+    with_another_level,
 )
 
 STEPS, STEP, CAPACITY, LOSS, HEAT = 700, 60.0, 20_000.0, 25.0, 300.0
+# Of a mass that follows within two steps: heat that flickers is none of a lower level.
+QUICK_MASS = 3_000.0
 
 
-def one_mass(conductance: bool = False) -> LinearAnswer:
+def one_mass(conductance: bool = False, capacity: float = CAPACITY) -> LinearAnswer:
     """A mass that loses heat to its surroundings, 20 K below it where a conductance is asked for."""
-    kept = np.exp(-LOSS / CAPACITY * STEP)
+    kept = np.exp(-LOSS / capacity * STEP)
     unit = (1.0 - kept) / LOSS
     return LinearAnswer(
         np.array([[[kept]]]),
@@ -39,6 +42,14 @@ def truth(generator: np.random.Generator, condition: np.ndarray) -> np.ndarray:
         chance = 0.9 if on[t - 1] else 0.06 * condition[t]
         on[t] = generator.random() < chance
     return on
+
+
+def at_levels(generator: np.random.Generator) -> np.ndarray:
+    """Something that is on a third of the time, in turn at one level and at two fifths of it."""
+    share = np.zeros(STEPS)
+    for number, begin in enumerate(range(20, STEPS - 30, 45)):
+        share[begin : begin + generator.integers(8, 22)] = (1.0, 0.4)[number % 2]
+    return share
 
 
 def readings(answer: LinearAnswer, on: np.ndarray, size: float, generator: np.random.Generator) -> Readings:
@@ -77,6 +88,38 @@ def test_a_course_and_its_size_are_found_together(conductance):
     assert found.chain.begin[1] > 2.0 * found.chain.begin[0]
 
 
+@pytest.mark.parametrize("conductance", [False, True])
+def test_levels_of_what_is_on_are_found_where_there_are_two(conductance):
+    generator = np.random.default_rng(13)
+    share, answer = at_levels(generator), one_mass(conductance, QUICK_MASS)
+    size = 15.0 if conductance else HEAT
+    filter_ = ReadingFilter(readings(answer, share, size, generator))
+    single = find_course(answer, filter_, Chain.usual(np.zeros(STEPS, dtype=int)), size, 4.0 * size)
+    found = with_another_level(answer, filter_, single, 4.0 * size)
+    assert sorted(found.size * np.array(found.shares)) == pytest.approx([0.4 * size, size], rel=0.1)
+    sizes = np.where(found.on, found.size * np.concatenate(([0.0], found.shares))[found.level], 0.0)
+    assert np.mean(np.abs(sizes - size * share) < 0.1 * size) > 0.93
+    # There is no third one.
+    assert with_another_level(answer, filter_, found, 4.0 * size) is None
+
+
+def test_one_level_stays_one():
+    generator = np.random.default_rng(17)
+    on, answer = at_levels(generator) > 0.0, one_mass(capacity=QUICK_MASS)
+    filter_ = ReadingFilter(readings(answer, on, HEAT, generator))
+    single = find_course(answer, filter_, Chain.usual(np.zeros(STEPS, dtype=int)), HEAT, 4.0 * HEAT)
+    assert with_another_level(answer, filter_, single, 4.0 * HEAT) is None
+
+
+def test_moves_between_levels_are_probabilities():
+    chain = Chain(np.array([0.02, 0.1]), np.array([0.05, 0.2]), np.zeros(STEPS, dtype=int))
+    for levels in (1, 2, 3):
+        moves = np.exp(chain.log_moves(levels))
+        np.testing.assert_allclose(moves.sum(axis=2), 1.0)
+        np.testing.assert_allclose(moves[:, 0, 1:].sum(axis=1), chain.begin)
+        np.testing.assert_allclose(1.0 - moves[:, 1, 1], chain.end)
+
+
 def test_nothing_is_found_in_noise():
     generator = np.random.default_rng(5)
     answer = one_mass()
@@ -92,8 +135,8 @@ def test_the_size_of_a_known_course_has_the_error_that_it_states():
     apart = []
     for _ in range(30):
         filter_ = ReadingFilter(readings(answer, on, HEAT, generator))
-        size, sigma = size_of(answer, filter_, on, HEAT, 10.0 * HEAT)
-        apart.append((size - HEAT) / sigma)
+        sizes, sigma = sizes_of(answer, filter_, on.astype(int), np.array([HEAT]), 10.0 * HEAT)
+        apart.append((sizes[0] - HEAT) / sigma)
     assert 0.6 < np.std(apart) < 1.5
 
 
@@ -125,5 +168,5 @@ def test_a_conductance_never_takes_more_in_a_step_than_there_is():
     assert one_mass().largest == np.inf
     found = find_course(answer, filter_, Chain.usual(np.zeros(STEPS, dtype=int)), 1e6, 1e6)
     assert found is None or np.isfinite(found.size + found.log_evidence)
-    course = filter_.courses(answer, Chain.usual(np.zeros(STEPS, dtype=int)), 1e6, 24)
+    course = filter_.courses(answer, Chain.usual(np.zeros(STEPS, dtype=int)), np.array([1e6]), 24)
     assert not course[0].any()

@@ -91,7 +91,7 @@ class InIntervals:
     intervals : sequence of (float, float), [s]
     course : str
         ``PULSES``: few intervals of about one size, edges free; ``STEPS``: as well, each of a size of its
-        own; ``STATES``: any number of one size, their edges as they are.
+        own; ``STATES``: any number at one size or a few, edges and shares of the sizes as they are.
     sizes : sequence of float
         Usual size of every interval beside the common one; 1 where empty.
     blurred : float, [s]
@@ -119,7 +119,8 @@ class InIntervals:
         self._width = max(blurred, min(EDGE_WIDTH, EDGE_SHARE * float(shortest)))
         if course == STATES:
             edges = [linear(name, value, 0.0, "s") for name, value in self._named(intervals)]
-            self.parameters = (shape("lag", self._width, 0.0, "s"), *edges)
+            levels = [shape(f"factor_{n}", size, 0.0) for n, size in enumerate(sizes, 1)]
+            self.parameters = (shape("lag", self._width, 0.0, "s"), *edges, *levels)
             return
         jitter = STEP_SIGMA if course == STEPS else JITTER
         usual = sizes or (1.0,) * self._number
@@ -481,4 +482,19 @@ def when_words(candidate: Candidate, reported: Mapping[str, Reported]) -> str:
             law += f" above {quantity(onset)}"
         return f" on average while on, following {law} as no effect of the catalogue does"
     count = sum(item.name.startswith("start_") for item in candidate.parameters.values())
-    return f" in {'one interval' if count == 1 else f'{count} intervals'} that no recorded input explains"
+    when = "one interval" if count == 1 else f"{count} intervals"
+    return f" in {when}{_level_words(candidate, reported)} that no recorded input explains"
+
+
+def _level_words(candidate: Candidate, reported: Mapping[str, Reported]) -> str:
+    """Sizes of what is on at a few levels; empty where it has one size, or each interval its own."""
+    term = candidate.terms[0]
+    own = {item.name: item for item in term.on.parameters}
+    factors = [item for name, item in own.items() if name.startswith("factor_")]
+    levels = sorted({item.value for item in factors})
+    if len(levels) < 2 or any(item.sigma for item in factors):
+        return ""
+    mean = reported[term.parameters[0].name]
+    usual = term.on.mean_share({name: item.value for name, item in own.items()})
+    sizes = [quantity(replace(mean, value=mean.value * level / usual)) for level in levels]
+    return f" at {len(levels)} levels ({', '.join(sizes)})"
