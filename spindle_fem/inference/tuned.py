@@ -285,10 +285,10 @@ SEPARATES, MOSTLY = 0.9, 0.6
 # ------------------------------------------------------------- check by the full model (--full-model)
 # Tolerances of a step (in the mean over the machine), of its coupling and of the inputs in terms of the
 # quietest channel's noise. (In eleven recordings of the recorded spindle, with 2 to 60 jumps, readings are
-# 0.1 to 1.3 of that noise, root mean square, from those of two to five times the steps; a quarter of the
-# first one leaves half of that with a quarter more steps, four times the second changes nothing, but what
-# enters and leaves then balances no more.)
-STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 3.0, 1.0, 2.0
+# 0.1 to 1.2 of that noise, root mean square, from those of two to five times the steps, most at one step of
+# speed; half the first one leaves two thirds of that with a third more steps. The second one says how well
+# heat balances: with twice as much two of the eleven would have to be run again.)
+STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 2.0, 0.5, 2.0
 
 # ------------------------------------------------------ watch (python -m validation.watch_delay)
 # Time over which what readings taught of the machine's coordinates is forgotten again, s: errors of structure
