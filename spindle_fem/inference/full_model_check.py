@@ -57,8 +57,8 @@ COARSE_MESH = {"preset": "coarse", "order": 1, "size_factor": 1.0, "size": {}}
 QUIETEST, LOUDEST = 0.02, 0.2
 # First step of a run and after a jump, s: about what its error allows there.
 FIRST_STEP = 60.0
-# Share of the heat that may be missing in a run, for each kelvin of that noise: a tenth of what so coarse a
-# coupling may leave. (Two duty cycles leave a fortieth to a quarter of it.)
+# Share of the heat that may be missing in a run, for each kelvin of that noise: a fifth of what so coarse a
+# coupling may leave. (Seven recordings leave a hundredth to four fifths of it.)
 IMBALANCE_PER_KELVIN = 0.01
 # Most time steps of a fit that is run unasked: it then takes about as long as the search.
 MOST_STEPS = 800

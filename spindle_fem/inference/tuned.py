@@ -287,7 +287,7 @@ SEPARATES, MOSTLY = 0.9, 0.6
 # quietest channel's noise. (In eleven recordings of the recorded spindle, with 2 to 60 jumps, readings are
 # 0.1 to 1.2 of that noise, root mean square, from those of two to five times the steps, most at one step of
 # speed; half the first one leaves two thirds of that with a third more steps. The second one says how well
-# heat balances: with twice as much two of the eleven would have to be run again.)
+# heat balances: with twice as much three of the eleven would have to be run again.)
 STEP_ERROR, COUPLING_ERROR, INPUT_RESOLUTION = 2.0, 0.5, 2.0
 
 # ------------------------------------------------------ watch (python -m validation.watch_delay)
