@@ -270,6 +270,7 @@ def test_no_label_of_heat_charts_is_clipped_and_lines_under_others_are_wider():
         ("2026-03-09T20:00:00Z", 86400.0, ["21:00", "00:00\n03-10", "03:00", "06:00"]),
         ("2026-02-27T12:00:00Z", 5 * 86400.0, ["02-28", "03-01", "03-02", "03-03", "03-04"]),
         ("2026-03-09T07:30:00Z", 0.0, ["07:30"]),
+        ("2016-05-02T08:00:00Z", 1157 * 86400.0, ["2017-01", "2018-01", "2019-01"]),
     ],
 )
 def test_time_goes_by_the_clock_where_it_is_known(start, seconds, shown):
@@ -279,6 +280,10 @@ def test_time_goes_by_the_clock_where_it_is_known(start, seconds, shown):
     told = [str(begin + np.timedelta64(round(1000 * place), "ms"))[11:16] for place in places]
     if ":" in texts[0]:
         assert told == [text[:5] for text in texts]
+    if label.startswith("month"):
+        begun = [str(begin + np.timedelta64(round(1000 * place), "ms"))[:16] for place in places]
+        assert begun == [f"{text}-01T00:00" for text in texts]
+        assert places[-1] < seconds
     assert label.endswith(f"from {start[:10]}")
 
 
