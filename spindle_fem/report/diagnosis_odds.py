@@ -71,12 +71,15 @@ def set_probabilities(data: xr.Dataset) -> Figure:
 
 @styled
 def finding_intervals(findings: Sequence[Mapping[str, Any]], what: str = "what was found") -> Figure | None:
-    """Value and 90 % interval of every parameter of the findings; None where there are none."""
+    """Value and 90 % interval of every parameter that was found; None where there are none.
+
+    What is fixed, as the lag of a state that switches within a step, was not found.
+    """
     rows = [
         (item, name, value)
         for item in findings
         for name, value in item["parameters"].items()
-        if value["low"] is not None and value["high"] is not None
+        if value["low"] is not None and value["high"] is not None and value["low"] < value["high"]
     ]
     if not rows:
         return None
@@ -86,7 +89,7 @@ def finding_intervals(findings: Sequence[Mapping[str, Any]], what: str = "what w
         top = 104.0 + number * height
         axes = pixel_axes(figure, 660.0, top, 620.0, 22.0)
         low, high, middle = value["low"], value["high"], value["value"]
-        width = max(high - low, 1e-9 * max(abs(middle), 1.0))
+        width = high - low
         axes.plot([low, high], [0.0, 0.0], color=CYCLE[0], linewidth=5.0, solid_capstyle="butt")
         axes.plot(middle, 0.0, marker="o", color=INK, markersize=6)
         axes.set(xlim=(low - 0.35 * width, high + 0.35 * width), yticks=[])
