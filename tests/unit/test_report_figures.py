@@ -23,7 +23,7 @@ from spindle_fem.report.clock_axis import clock_numbers
 from spindle_fem.report.crosscheck_charts import convergence_chart, speed_chart
 from spindle_fem.report.definition_tables import customary, input_groups
 from spindle_fem.report.diagnosis_drawing import DOUBTED, located_on_machine
-from spindle_fem.report.diagnosis_odds import machine_parameters
+from spindle_fem.report.diagnosis_odds import finding_intervals, machine_parameters
 from spindle_fem.report.figure_style import TEMPERATURE_MAP, new_figure, rasterise, scale_of, set_title
 from spindle_fem.report.heat_charts import CHARTS
 from spindle_fem.report.leader_labels import spread
@@ -285,6 +285,15 @@ def test_time_goes_by_the_clock_where_it_is_known(start, seconds, shown):
         assert begun == [f"{text}-01T00:00" for text in texts]
         assert places[-1] < seconds
     assert label.endswith(f"from {start[:10]}")
+
+
+def test_what_is_fixed_is_not_drawn_as_found():
+    fixed = {"value": 20.0, "low": 20.0, "high": 20.0, "unit": "s"}
+    found = {"value": 520.0, "low": 400.0, "high": 700.0, "unit": "W"}
+    item = {"effect": "unrecorded_heat_source", "component": "body"}
+    assert finding_intervals([item | {"parameters": {"lag": fixed}}]) is None
+    figure = finding_intervals([item | {"parameters": {"heat": found, "lag": fixed}}])
+    assert len(figure.axes) == 1
 
 
 def test_a_dollar_sign_in_a_name_begins_no_formula():
