@@ -150,14 +150,14 @@ def test_unasked_a_network_says_nothing_of_a_full_model(predictor):
 def test_time_is_followed_as_well_as_the_quietest_channel_can_tell(predictor):
     options = options_for(predictor)
     assert (options.error, options.coupling_tolerance, options.input_resolution) == pytest.approx(
-        (0.4, 0.1, 0.2), rel=1e-3
+        (0.2, 0.05, 0.2), rel=1e-3
     )
     assert options.energy_tolerance == pytest.approx(0.001, rel=1e-3)
     recording = predictor.recordings[0]
     loud = SimpleNamespace(recordings=(replace(recording, sigma=10.0 * recording.sigma),))
-    assert options_for(loud).error == 0.8
+    assert options_for(loud).error == 0.4
     quiet = SimpleNamespace(recordings=(recording, replace(recording, sigma=0.3 * recording.sigma)))
-    assert options_for(quiet).error == pytest.approx(0.12, rel=0.01)
+    assert options_for(quiet).error == pytest.approx(0.06, rel=0.01)
 
 
 def test_unasked_a_full_model_of_very_many_steps_is_not_run(predictor, monkeypatch):
