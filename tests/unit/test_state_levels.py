@@ -3,15 +3,11 @@
 import numpy as np
 import pytest
 
-from spindle_fem.effects.registry import build, catalogue, definition_entry, interval_effects
-from spindle_fem.inference.hypothesis_fit import Problem, amplitude_name
-from spindle_fem.inference.hypothesis_search import Search
-from spindle_fem.inference.opened_machine import open_machine
-from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.prepared_problem import calibrate
-from spindle_fem.inference.state_search import add_states, inferred_states, settle_best
-from spindle_fem.recordings.align import read_recording
-from tests.support.flawed_network import DURATION, MACHINE, record
+from spindle_fem.effects.registry import build, catalogue, definition_entry
+from spindle_fem.inference.hypothesis_fit import amplitude_name
+from spindle_fem.inference.state_search import inferred_states, settle_best
+from tests.support.flawed_network import DURATION
+from tests.support.searched_network import searched
 
 # Heat of the body, W, for ten minutes of every half an hour, high and low in turn.
 HIGH, LOW, ON, PERIOD = 120.0, 45.0, 600.0, 1500.0
@@ -29,31 +25,15 @@ def at_one(time):
     return HIGH if at_levels(time) else 0.0
 
 
-@pytest.fixture
-def searched(tmp_path):
-    """Search for what switches in a recording of a network."""
-
-    def search_in(extra):
-        (tmp_path / "drive.toml").write_text(MACHINE)
-        run = record(tmp_path / "run", 3, times=np.arange(0.0, DURATION + 1.0, 60.0), extra=extra)
-        machine = open_machine(tmp_path / "drive.toml", (), [read_recording(run)], [])
-        predictor = Predictor(machine.fast, machine.recordings)
-        calibrated = calibrate(None, predictor)
-        problem = Problem(predictor, calibrated.known, calibrated.slow, predictor.observations)
-        effects = catalogue()
-        weights = {name: effect.prior_weight for name, effect in effects.items()}
-        search = Search(problem, machine.view, effects, (), interval_effects(), weights, found={})
-        nothing = problem.fit()
-        search.keep(search.hypothesis(nothing))
-        add_states(search, nothing)
-        settle_best(search)
-        return search
-
-    return search_in
+def settled(folder, extra):
+    """Search for what switches in a recording of a network, followed again at further levels."""
+    _, search = searched(folder, np.arange(0.0, DURATION + 1.0, 60.0), extra)
+    settle_best(search)
+    return search
 
 
-def test_heat_at_two_levels_is_found_stated_and_written(searched):
-    search = searched(at_levels)
+def test_heat_at_two_levels_is_found_stated_and_written(tmp_path):
+    search = settled(tmp_path, at_levels)
     fit = search.ranked()[0].fit
     (candidate,) = fit.candidates
     effect = catalogue()[candidate.effect]
@@ -75,8 +55,8 @@ def test_heat_at_two_levels_is_found_stated_and_written(searched):
     assert effect.sizes(read, {}) == pytest.approx(sizes)
 
 
-def test_heat_at_one_level_stays_at_one(searched):
-    search = searched(at_one)
+def test_heat_at_one_level_stays_at_one(tmp_path):
+    search = settled(tmp_path, at_one)
     fit = search.ranked()[0].fit
     effect = catalogue()[fit.candidates[0].effect]
     sizes = effect.sizes(fit.candidates[0], fit.values)

@@ -6,18 +6,13 @@ import numpy as np
 import pytest
 
 from spindle_fem.effects.framework.unrecorded import STATES, InIntervals
-from spindle_fem.effects.registry import catalogue, interval_effects
+from spindle_fem.effects.registry import catalogue
 from spindle_fem.inference import opened_machine
 from spindle_fem.inference.followed_readings import FollowedReadings
-from spindle_fem.inference.hypothesis_fit import Problem
-from spindle_fem.inference.hypothesis_search import Search
-from spindle_fem.inference.opened_machine import open_machine
-from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.prepared_problem import calibrate
 from spindle_fem.inference.set_problems import SetProblems
-from spindle_fem.inference.state_search import BLUR, add_states, inferred_states, states_on_rows
-from spindle_fem.recordings.align import read_recording
-from tests.support.flawed_network import DURATION, MACHINE, record
+from spindle_fem.inference.state_search import BLUR, inferred_states, states_on_rows
+from tests.support.flawed_network import DURATION
+from tests.support.searched_network import searched
 from validation.score_families import overlap_score
 
 # Heat on for 70 s and off for 50 s in turn, some minutes at a time: steps of a fit are 48 s here, rows 5 s.
@@ -50,23 +45,12 @@ def test_blurred_edges_give_the_means_over_steps_that_are_longer_than_intervals(
 
 def test_what_switches_within_a_step_of_the_fit_is_found_on_the_rows(tmp_path, monkeypatch):
     monkeypatch.setattr(opened_machine, "MOST_STAMPS", STAMPS)
-    (tmp_path / "drive.toml").write_text(MACHINE)
-    run = record(tmp_path / "run", 3, times=np.arange(0.0, DURATION + 1.0, ROW), extra=flickers)
-    machine = open_machine(tmp_path / "drive.toml", (), [read_recording(run)], [])
-    predictor = Predictor(machine.fast, machine.recordings)
-    calibrated = calibrate(None, predictor)
-    problem = Problem(predictor, calibrated.known, calibrated.slow, predictor.observations)
-    effects = catalogue()
-    weights = {name: effect.prior_weight for name, effect in effects.items()}
-    nothing = problem.fit()
-    search = Search(problem, machine.view, effects, (), interval_effects(), weights, found={})
-    search.keep(search.hypothesis(nothing))
-    add_states(search, nothing)
-    fit = search.ranked()[0].fit
+    machine, search = searched(tmp_path, np.arange(0.0, DURATION + 1.0, ROW), flickers)
+    problem, fit = search.problem, search.ranked()[0].fit
     (name,) = (c.amplitude for c in fit.candidates)
     states = {"steps": inferred_states(search, problem, fit)}
     states["rows"] = states_on_rows(search, problem, fit, machine.rows, ())
-    effect = effects[fit.candidates[0].effect]
+    effect = catalogue()[fit.candidates[0].effect]
     score = {
         key: overlap_score(FLICKER, effect.intervals(found[name].candidate, {}))
         for key, found in states.items()
