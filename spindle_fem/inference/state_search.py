@@ -449,7 +449,7 @@ def course_about(
     everything: bool = False,
     effort: tuple[int, int] = THOROUGH,
 ) -> Course | None:
-    """The course again, about a fit that holds one already."""
+    """The course again, about a fit that holds one already: at one level where its second is never on."""
     about = _about(search.problem, fit, place.recording, candidate, everything=everything)
     if about is None:
         return None
