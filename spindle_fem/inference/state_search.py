@@ -8,7 +8,7 @@ course is its likelihood over that of all courses under the fitted chain.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -318,18 +318,14 @@ def _settle_again(search: Search, fit: Fit, candidate: Candidate) -> None:
 
 def _settle_levels(search: Search, fit: Fit, candidate: Candidate) -> None:
     """The state of a set at one level more, where that is likelier."""
-    known = search.courses[candidate.amplitude]
-    place, course, _ = known
+    place, course, _ = search.courses[candidate.amplitude]
     about = _about(search.problem, fit, place.recording, candidate)
     if about is None:
         return
     spread = 2.0 * max(_usual(search, place), course.size)
     more = with_another_level(answer_of(about[0], place.pattern), about[1], course, spread, QUICK)
     if more is not None:
-        before = search.found.get(identity(fit.candidates))
         settle(search, fit, place, more, candidate)
-        if search.found.get(identity(fit.candidates)) is before:
-            search.courses[candidate.amplitude] = known
 
 
 def _about(
@@ -353,7 +349,6 @@ def _settle_intervals(search: Search, fit: Fit, candidate: Candidate) -> None:
         # A level may change at more places than those that may switch.
         return
     place = places[wanted]
-    rest, _ = without(fit, candidate)
     about = _about(search.problem, fit, number, candidate)
     if about is None:
         return
@@ -361,7 +356,7 @@ def _settle_intervals(search: Search, fit: Fit, candidate: Candidate) -> None:
     if best is not None:
         settle(search, fit, place, best, candidate)
         # Laws may have compensated for parts of the state that the intervals miss.
-        if rest:
+        if len(fit.candidates) > 1:
             settle(search, search.problem.fit(), place, best)
 
 
@@ -401,42 +396,51 @@ def _courses(search: Search, base: BaseRun, readings: ReadingFilter, place: Stat
 def settle(
     search: Search, fit: Fit, place: StatePlace, course: Course, left_out: Candidate | None = None
 ) -> None:
-    """Course and fit in turn, the best of them kept."""
-    problem = search.problem
+    """Course and fit in turn; the best of them is kept unless such a set was likelier before."""
     rest, values = (fit.candidates, dict(fit.values)) if left_out is None else without(fit, left_out)
+    known = dict(search.courses)
+    best = _best_in_turn(search, rest, values, place, course)
+    earlier = None if best is None else search.found.get(identity(best.fit.candidates))
+    if best is not None and (earlier is None or earlier.score < best.score):
+        search.keep(best)
+    else:
+        search.courses = known
+
+
+def _best_in_turn(
+    search: Search, rest: Sequence[Candidate], values: Mapping[str, float], place: StatePlace, course: Course
+) -> Hypothesis | None:
+    """Course and fit in turn, beside other effects; the best of them, its course being the search's."""
+    problem = search.problem
     best: Hypothesis | None = None
     for _ in range(tuned.COURSE_ROUNDS):
         grid = problem.predictor.drives[place.recording].grid
         if len(intervals_of(course.on, grid)) < FEWEST:
-            return
+            return None
         shares = course.shares_at(levels_of(course.level))
         candidate = _candidate(search, place, intervals_of(course.level, grid), shares, course.size)
-        factor = values.get(candidate.sized_by, 1.0)
-        start = values | {amplitude_name(candidate): course.size / factor}
-        fitted = search.problem.simulated((*rest, candidate), start)
+        size = course.size / values.get(candidate.sized_by, 1.0)
+        fitted = problem.simulated((*rest, candidate), values | {amplitude_name(candidate): size})
         if fitted is None:
-            return
+            return None
         numbers = len(course.chain.begin) + len(course.shares) - 1
         paid = course.log_choice + numbers * float(np.log(len(course.level)))
         known = search.courses.get(candidate.amplitude)
         search.courses[candidate.amplitude] = place, course, paid / (course.log_evidence + course.log_choice)
         hypothesis = search.hypothesis(fitted)
-        better = best is None or hypothesis.score > best.score
-        enough = best is not None and hypothesis.score < best.score + tuned.WORTH_ANOTHER
-        if better:
+        gain = np.inf if best is None else hypothesis.score - best.score
+        if gain > 0.0:
             best = hypothesis
-        elif known is not None:
+        else:
             search.courses[candidate.amplitude] = known
-        if enough:
+        if gain < tuned.WORTH_ANOTHER:
             break
         values = fitted.values
         again = course_about(search, fitted, place, candidate, course)
         if again is None or np.array_equal(again.level, course.level):
             break
         course = again
-    earlier = search.found.get(identity(best.fit.candidates))
-    if earlier is None or earlier.score < best.score:
-        search.keep(best)
+    return best
 
 
 def course_about(
@@ -454,10 +458,9 @@ def course_about(
     if about is None:
         return None
     base, readings = about
-    usual = _usual(search, place)
     size = fit.values[amplitude_name(candidate)] * fit.values.get(candidate.sized_by, 1.0)
     chain = best_chain(base, course.chain, course)
-    answer, spread = answer_of(base, place.pattern), max(2.0 * usual, 2.0 * size)
+    answer, spread = answer_of(base, place.pattern), 2.0 * max(_usual(search, place), size)
     found = find_course(answer, readings, chain, size, spread, effort, course.shares)
     if found is None and len(course.shares) > 1:
         found = find_course(answer, readings, chain, size, spread, effort)
@@ -493,6 +496,5 @@ def _candidate(
     found = place.effect.over(
         search.view, place.pattern.spot, intervals, course=STATES, sizes=shares, blurred=blurred
     )
-    several = len(search.problem.predictor.recordings) > 1
-    recording = place.recording if several else None
+    recording = place.recording if len(search.problem.predictor.recordings) > 1 else None
     return replace(found, reference=max(size, 1e-3), recording=recording)

@@ -1,11 +1,14 @@
 """Hidden states of a network that are on at two levels: found, stated and written into a definition."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from spindle_fem.effects.registry import build, catalogue, definition_entry
+from spindle_fem.inference import state_search
 from spindle_fem.inference.hypothesis_fit import amplitude_name
-from spindle_fem.inference.state_search import inferred_states, settle_best
+from spindle_fem.inference.state_search import inferred_states, settle, settle_best
 from tests.support.flawed_network import DURATION
 from tests.support.searched_network import searched
 
@@ -62,3 +65,18 @@ def test_heat_at_one_level_stays_at_one(tmp_path):
     sizes = effect.sizes(fit.candidates[0], fit.values)
     assert len(set(np.round(sizes, 6))) == 1
     assert "levels" not in effect.statement(fit.candidates[0], effect.report(fit.candidates[0], fit.values))
+
+
+def test_worse_course_leaves_search_as_it_was(tmp_path, monkeypatch):
+    search = settled(tmp_path, at_one)
+    best = search.ranked()[0]
+    (candidate,) = best.fit.candidates
+    known = search.courses[candidate.amplitude]
+    place, course, _ = known
+    # Half of the intervals, and not followed again: a set with this course is less likely.
+    monkeypatch.setattr(state_search, "course_about", lambda *given: None)
+    level = np.where(np.arange(len(course.level)) < len(course.level) // 2, course.level, 0)
+    half = replace(course, level=level.astype(course.level.dtype))
+    settle(search, best.fit, place, half, candidate)
+    assert search.ranked()[0] is best
+    assert search.courses[candidate.amplitude] is known
