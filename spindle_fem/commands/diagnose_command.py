@@ -198,8 +198,7 @@ def _diagnose(request: _Request, reporter: BackgroundProcess | None) -> dict[str
 def _write(diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, report: bool) -> dict[str, Any]:
     """Write predictions, states and the data of the report; the content so far."""
     before = predictions_at_stamps(diagnosis.unchanged, diagnosis.null)
-    plant = diagnosis.predictor if diagnosis.final.candidates else diagnosis.unchanged
-    after = predictions_at_stamps(plant, diagnosis.final)
+    after = predictions_at_stamps(diagnosis.predictor, diagnosis.final)
     _write_predictions(diagnosis, place, "before", before)
     _write_predictions(diagnosis, place, "after", after)
     content = diagnosis_content(diagnosis, opened, before, after)

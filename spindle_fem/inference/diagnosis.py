@@ -60,9 +60,10 @@ class Diagnosis:
     Attributes
     ----------
     predictor : Predictor
-        Machine on the diagnosed recordings, on the basis of final fits.
+        Machine on the diagnosed recordings, on the basis of final fits, with what its misdescriptions do
+        beside the chosen set: that of ``final``.
     unchanged : Predictor
-        The same for nothing missing: what its misdescriptions do without the set that was found.
+        The same with what they do with nothing missing: that of ``null``.
     hypotheses : tuple of Hypothesis
         The most probable first.
     null : Fit
@@ -262,7 +263,7 @@ def diagnose_recordings(
     judgement = with_wrong_definition(judgement, null.fit, wrong, told)
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit
-    about_chosen = problems.of(chosen_fit) if chosen_fit.candidates else problems.first
+    about_chosen = problems.of(chosen_fit)
     if chosen_fit.candidates:
         settled(about_chosen.predictor, chosen_fit)
     followed = readings.followed(chosen_fit)

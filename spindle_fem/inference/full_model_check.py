@@ -270,13 +270,13 @@ def _both_fits(
     keep: Keep,
     progress: Progress,
 ) -> dict[str, Any]:
-    predictor = diagnosis.predictor
     progress("full model: mesh")
     prepared = begun.machine_on(mesh)
-    fits = {"before": diagnosis.null, "after": diagnosis.final}
-    same = _is_same(*fits.values())
-    different = {"before, which is after": diagnosis.null} if same else fits
-    runs = _runs(prepared, predictor, different, options, mesh, begun.fits, progress)
+    before, after = (diagnosis.unchanged, diagnosis.null), (diagnosis.predictor, diagnosis.final)
+    fits = {"before": before, "after": after}
+    same = _is_same(diagnosis.null, diagnosis.final)
+    different = {"before, which is after": before} if same else fits
+    runs = _runs(prepared, different, options, mesh, begun.fits, progress)
     if same:
         (run,) = runs.values()
         runs = dict.fromkeys(fits, run)
@@ -284,6 +284,7 @@ def _both_fits(
     apart: dict[str, list[Array]] = {}
     reduced: dict[str, list[Array]] = {}
     for name, full in runs.items():
+        predictor, fit = fits[name]
         keep(name, full.predicted)
         found[name] = {
             "train_rmse_K": rmse(predictor, full.predicted, heldout=False),
@@ -293,10 +294,11 @@ def _both_fits(
             "steps": full.steps,
             "seconds": full.seconds,
         }
-        reduced[name] = predictions_at_stamps(predictor, fits[name])
+        reduced[name] = predictions_at_stamps(predictor, fit)
         apart[name] = [a - b for a, b in zip(full.predicted, reduced[name], strict=True)]
+    predictor = diagnosis.predictor
     left = left_by_both(predictor, reduced, {name: full.predicted for name, full in runs.items()})
-    supplied = any(n.startswith(FIRST_ORDER) for fit in fits.values() for n in fit.values)
+    supplied = any(n.startswith(FIRST_ORDER) for _, fit in fits.values() for n in fit.values)
     return {
         "mesh": mesh,
         "reason": None,
@@ -323,8 +325,7 @@ def spec_on(spec: MachineSpec, mesh: str) -> MachineSpec:
 # -------------------------------------------------------------------- details
 def _runs(
     machine: PreparedMachine,
-    predictor: Predictor,
-    fits: Mapping[str, Fit],
+    fits: Mapping[str, tuple[Predictor, Fit]],
     options: TransientOptions,
     mesh: str,
     begun: Sequence[BegunFit],
@@ -334,11 +335,13 @@ def _runs(
 
     In this process, with a warning, where another one ends prematurely.
     """
-    served = {name: item for name, fit in fits.items() for item in begun if item.serves(fit, mesh, options)}
+    served = {
+        name: item for name, (_, fit) in fits.items() for item in begun if item.serves(fit, mesh, options)
+    }
     jobs = {
-        name: partial(alone, run_fit, machine, predictor, fit, options)
+        name: partial(alone, run_fit, machine, *fit, options)
         if mesh == COARSE
-        else partial(run_fit, machine, predictor, fit, options)
+        else partial(run_fit, machine, *fit, options)
         for name, fit in fits.items()
     }
     if mesh != COARSE or thread_count() == 1:
@@ -347,7 +350,7 @@ def _runs(
     own = [name for name in fits if name not in served]
     try:
         found = dict(zip(own, in_copies([jobs[name] for name in own], len(own)), strict=True))
-        found |= {name: finished(predictor, fits[name], item.wait()) for name, item in served.items()}
+        found |= {name: finished(*fits[name], item.wait()) for name, item in served.items()}
         return {name: found[name] for name in fits}
     except WorkerDiedError as error:
         progress(f"{error.where}: {error.what}")

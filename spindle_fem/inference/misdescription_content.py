@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,29 +29,26 @@ def misdescription_content(diagnosis: Diagnosis) -> dict[str, Any]:
         when nothing was found), ``measure`` (the direction that is worth measuring most, and why; None where
         none moves), ``wrong`` (the row of a definition that is wrong; None else).
     """
-    directions = diagnosis.predictor.misdescribed
-    final, null = diagnosis.final, diagnosis.null
-    found = bool(final.candidates)
-    about = null if found else final
+    final, null = (diagnosis.predictor, diagnosis.final), (diagnosis.unchanged, diagnosis.null)
+    found = bool(diagnosis.final.candidates)
     wrong = diagnosis.wrong.direction if diagnosis.judgement.verdict == "parameter" and not found else None
     return {
-        "directions": len(directions),
-        "left_open": _rows(diagnosis, final, directions),
-        "instead": _rows(diagnosis, null, directions) if found else [],
-        "measure": _to_measure(diagnosis, about, directions),
-        "wrong": None if wrong is None else _row(diagnosis, final, wrong),
+        "directions": len(diagnosis.predictor.misdescribed),
+        "left_open": _rows(*final),
+        "instead": _rows(*null) if found else [],
+        "measure": _to_measure(*(null if found else final)),
+        "wrong": None if wrong is None else _row(*final, wrong),
     }
 
 
-def _rows(diagnosis: Diagnosis, fit: Fit, directions: Sequence[Misdescription]) -> list[dict[str, Any]]:
-    rows = [_row(diagnosis, fit, item) for item in directions]
+def _rows(predictor: Predictor, fit: Fit) -> list[dict[str, Any]]:
+    rows = [_row(predictor, fit, item) for item in predictor.misdescribed]
     moved = [row for row in rows if abs(row["sigmas"]) >= MOVED]
     return sorted(moved, key=lambda row: -abs(row["sigmas"]))[:MOST_LISTED]
 
 
-def _row(diagnosis: Diagnosis, fit: Fit, item: Misdescription) -> dict[str, Any]:
+def _row(predictor: Predictor, fit: Fit, item: Misdescription) -> dict[str, Any]:
     """One direction in one fit."""
-    predictor = diagnosis.predictor
     late = _late_already(predictor, item)
     value = fit.values[item.coordinate] + late
     low, high = fit.interval(item.coordinate, float(ndtri(0.5 + 0.5 * LEVEL)) * tuned.INTERVAL_WIDENING)
@@ -92,23 +88,21 @@ def _late_already(predictor: Predictor, item: Misdescription) -> float:
     return float(predictor.late[item.recording]) if item.delays == EVERY_CHANNEL else 0.0
 
 
-def _to_measure(
-    diagnosis: Diagnosis, fit: Fit, directions: Sequence[Misdescription]
-) -> dict[str, Any] | None:
+def _to_measure(predictor: Predictor, fit: Fit) -> dict[str, Any] | None:
     """The direction that readings hold farthest off the definition, in widths of its posterior.
 
     None where none lies more than one width off.
     """
     names = [c.name for c in fit.coordinates]
     best, most = None, 1.0
-    for item in directions:
+    for item in predictor.misdescribed:
         row = names.index(item.coordinate)
-        late = _late_already(diagnosis.predictor, item) / item.sigma
+        late = _late_already(predictor, item) / item.sigma
         widths = abs(fit.position[row] + late) / np.sqrt(fit.covariance[row, row])
         if widths > most:
             best, most = item, float(widths)
     if best is None:
         return None
-    row = _row(diagnosis, fit, best)
+    row = _row(predictor, fit, best)
     why = f"the readings hold it {most:.1f} standard deviations off the definition"
     return {"key": best.key, "name": best.name, "expected": row["value"], "unit": best.unit, "why": why}

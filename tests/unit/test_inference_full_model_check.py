@@ -12,7 +12,7 @@ from spindle_fem.effects.registry import candidates_for, effect_of
 from spindle_fem.errors import EnergyBalanceError, MeshQualityError, SpecError, WorkerDiedError
 from spindle_fem.inference import full_model_check as full_model
 from spindle_fem.inference import full_model_runs
-from spindle_fem.inference.coordinate_names import PROBE_PREFIX
+from spindle_fem.inference.coordinate_names import MISDESCRIBED_PREFIX, PROBE_PREFIX
 from spindle_fem.inference.findings import predictions_at_stamps
 from spindle_fem.inference.full_model_check import (
     BegunRuns,
@@ -23,6 +23,7 @@ from spindle_fem.inference.full_model_check import (
     spec_on,
 )
 from spindle_fem.inference.full_model_runs import inputs_of_drive, physics_of_fit
+from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
@@ -75,8 +76,8 @@ def fit_of(members, values):
     return SimpleNamespace(candidates=tuple(members), values=values)
 
 
-def diagnosis_of(predictor, null, final):
-    return SimpleNamespace(predictor=predictor, null=null, final=final)
+def diagnosis_of(predictor, null, final, unchanged=None):
+    return SimpleNamespace(predictor=predictor, unchanged=unchanged or predictor, null=null, final=final)
 
 
 def test_a_fit_becomes_terms_values_and_factors(predictor, candidates):
@@ -294,6 +295,42 @@ def test_a_fit_that_was_begun_is_run_once(predictor, monkeypatch):
     full_model_errors(diagnosis_of(predictor, nothing, nothing), machine, begun=begun)
     assert ran == [nothing]
     assert prepared_for == []
+
+
+def test_what_drawings_leave_open_counts_as_it_does_without_the_set_before_and_beside_it_after(
+    predictor, monkeypatch
+):
+    coordinate = f"{MISDESCRIBED_PREFIX}width"
+    nothing, heat = (fit_of((), {"heat.front": share, coordinate: 1.0}) for share in (1.1, 1.3))
+
+    def opened(kelvin):
+        """The machine with a direction that moves every channel by some kelvin."""
+        move = np.full((predictor.drives[0].grid.size, 2), kelvin)
+        direction = Misdescription("width", "shaft.width", "m", 1.0, "Width.", change=None)
+        return predictor.misdescribed_by((direction,), {(0, coordinate): move})
+
+    def mesh_runs(machine, predictor, fit, options):
+        plain = {"heat.front": fit.values["heat.front"]}
+        return full_model_runs.MeshRuns((predictor.at_places(0, plain).temperature,), 7, 1.0)
+
+    prepared = SimpleNamespace(spec=predictor.fast.spec, operators=SimpleNamespace(n_unknowns=3))
+    monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
+    for module in (full_model, full_model_runs):
+        monkeypatch.setattr(module, "mesh_runs", mesh_runs)
+    monkeypatch.setattr(full_model, "thread_count", lambda: 2)
+    monkeypatch.setattr(full_model, "start_copy", lambda job: job)
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
+    without, beside = opened(0.5), opened(2.0)
+    begun, kept = BegunRuns(machine), {}
+    begun.begin(without, nothing)
+    begun.begin(beside, heat)
+    diagnosis = diagnosis_of(beside, nothing, heat, unchanged=without)
+    found = full_model_errors(diagnosis, machine, begun=begun, keep=kept.__setitem__)
+    for name, plant, fit in (("before", without, nothing), ("after", beside, heat)):
+        np.testing.assert_allclose(kept[name][0], predictions_at_stamps(plant, fit)[0], atol=1e-9)
+    for row in found["differences"]:
+        assert row["before_K"] == pytest.approx(0.0, abs=1e-9)
+        assert row["change_K"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_machine_that_cannot_be_meshed_ahead_is_told_where_errors_are_asked_for(predictor, monkeypatch):

@@ -326,7 +326,14 @@ def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
     fit = Problem(problem.predictor, wrong.belief, EXPECTED_SLOW, problem.observations).fit()
     verdict = SimpleNamespace(verdict="parameter")
     content = misdescription_content(
-        SimpleNamespace(predictor=problem.predictor, final=fit, null=fit, judgement=verdict, wrong=wrong)
+        SimpleNamespace(
+            predictor=problem.predictor,
+            unchanged=problem.predictor,
+            final=fit,
+            null=fit,
+            judgement=verdict,
+            wrong=wrong,
+        )
     )
     assert content["directions"] == len(directions)
     told = content["wrong"]
