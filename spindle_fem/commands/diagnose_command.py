@@ -198,7 +198,7 @@ def _diagnose(request: _Request, reporter: BackgroundProcess | None) -> dict[str
 def _write(diagnosis: Diagnosis, opened: DiagnosedMachine, place: Path, *, report: bool) -> dict[str, Any]:
     """Write predictions, states and the data of the report; the content so far."""
     before = predictions_at_stamps(diagnosis.unchanged, diagnosis.null)
-    after = predictions_at_stamps(diagnosis.predictor, diagnosis.final)
+    after = predictions_at_stamps(diagnosis.predictor, diagnosis.stated_fit)
     _write_predictions(diagnosis, place, "before", before)
     _write_predictions(diagnosis, place, "after", after)
     content = diagnosis_content(diagnosis, opened, before, after)

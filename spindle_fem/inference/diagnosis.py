@@ -264,8 +264,6 @@ def diagnose_recordings(
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit
     about_chosen = problems.of(chosen_fit)
-    if chosen_fit.candidates:
-        settled(about_chosen.predictor, chosen_fit)
     followed = readings.followed(chosen_fit)
     if followed.states and machine.rows:
         finer = readings.with_states(
@@ -273,6 +271,8 @@ def diagnose_recordings(
         )
         # On rows what a coarse picture leaves may pass for a state that flickers.
         followed = min(followed, finer, key=readings.left_with)
+    if chosen_fit.candidates:
+        settled(about_chosen.predictor, followed.fit if followed.states else chosen_fit)
     explanations = []
     about = problem.fit((), null.fit.values)
     patterns = [Pattern(spot, tuple(p for p in own if p in known)) for spot, own in view.spots.items()]

@@ -19,6 +19,7 @@ from spindle_fem.inference.findings import (
     predictions_at_stamps,
     rmse,
 )
+from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.misdescription_content import misdescription_content
 from spindle_fem.inference.mismatch_place import where_of
 from spindle_fem.inference.missing_heat import stretches
@@ -27,6 +28,7 @@ from spindle_fem.inference.verdict import Judgement
 from spindle_fem.results.run_summary import package_versions
 
 SCHEMA = "spindle-fem/diagnosis/1"
+STATES_ARE_TOLD = "; readings there tell when hidden states were on, and nothing else of the fit"
 
 
 def diagnosis_content(
@@ -71,9 +73,9 @@ def diagnosis_content(
         },
         "fit": {
             "before": _errors(diagnosis, before),
-            "after": _errors(diagnosis, after) | _told(diagnosis),
+            "after": _errors(diagnosis, after) | _by_what_is_told(diagnosis),
             "noise_K": noise_level(predictor),
-            "heldout": diagnosis.heldout,
+            "heldout": diagnosis.heldout + (STATES_ARE_TOLD if diagnosis.states else ""),
             "heldout_s": [
                 [list(ends) for ends in stretches(~use, recording.times)]
                 for recording, use in zip(predictor.recordings, predictor.use, strict=True)
@@ -98,12 +100,22 @@ def diagnosis_content(
     }
 
 
-def _told(diagnosis: Diagnosis) -> dict[str, float]:
-    """Held-out error with states and moments from all readings, sizes and laws without held-out ones."""
+def _by_what_is_told(diagnosis: Diagnosis) -> dict[str, float]:
+    """Held-out errors with states and moments from all readings, sizes and laws without held-out ones.
+
+    And, where states are followed, without any of them.
+    """
     if diagnosis.followed is None or diagnosis.followed.fit is diagnosis.final:
         return {}
-    predicted = predictions_at_stamps(diagnosis.predictor, diagnosis.followed.fit)
-    return {"heldout_states_told_rmse_K": rmse(diagnosis.predictor, predicted, heldout=True)}
+
+    def heldout_error(fit: Fit) -> float:
+        predicted = predictions_at_stamps(diagnosis.predictor, fit)
+        return rmse(diagnosis.predictor, predicted, heldout=True)
+
+    told = {"heldout_states_told_rmse_K": heldout_error(diagnosis.followed.fit)}
+    if diagnosis.states:
+        told["heldout_states_untold_rmse_K"] = heldout_error(diagnosis.final)
+    return told
 
 
 def _reasons(opened: DiagnosedMachine, judgement: Judgement) -> tuple[str, ...]:
@@ -135,14 +147,14 @@ def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     for coordinate in diagnosis.machine_coordinates:
         if coordinate.name.startswith((MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)):
             continue
-        low, high = diagnosis.final.interval(coordinate.name, 1.645)
+        low, high = diagnosis.stated_fit.interval(coordinate.name, 1.645)
         rows.append(
             {
                 "name": coordinate.name,
                 "prior": coordinate.value,
                 "prior_sigma": coordinate.sigma,
                 "logarithmic": coordinate.logarithmic,
-                "value": diagnosis.final.values[coordinate.name],
+                "value": diagnosis.stated_fit.values[coordinate.name],
                 "low": low,
                 "high": high,
                 "unit": coordinate.unit,

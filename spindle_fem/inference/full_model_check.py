@@ -272,9 +272,9 @@ def _both_fits(
 ) -> dict[str, Any]:
     progress("full model: mesh")
     prepared = begun.machine_on(mesh)
-    before, after = (diagnosis.unchanged, diagnosis.null), (diagnosis.predictor, diagnosis.final)
+    before, after = (diagnosis.unchanged, diagnosis.null), (diagnosis.predictor, diagnosis.stated_fit)
     fits = {"before": before, "after": after}
-    same = _is_same(diagnosis.null, diagnosis.final)
+    same = _is_same(diagnosis.null, diagnosis.stated_fit)
     different = {"before, which is after": before} if same else fits
     runs = _runs(prepared, different, options, mesh, begun.fits, progress)
     if same:

@@ -29,7 +29,7 @@ def misdescription_content(diagnosis: Diagnosis) -> dict[str, Any]:
         when nothing was found), ``measure`` (the direction that is worth measuring most, and why; None where
         none moves), ``wrong`` (the row of a definition that is wrong; None else).
     """
-    final, null = (diagnosis.predictor, diagnosis.final), (diagnosis.unchanged, diagnosis.null)
+    final, null = (diagnosis.predictor, diagnosis.stated_fit), (diagnosis.unchanged, diagnosis.null)
     found = bool(diagnosis.final.candidates)
     wrong = diagnosis.wrong.direction if diagnosis.judgement.verdict == "parameter" and not found else None
     return {

@@ -273,7 +273,7 @@ def _parameters(diagnosis: Diagnosis) -> dict[str, Any]:
     belief = diagnosis.calibrated.belief
     own = belief.coordinates
     known = np.linalg.inv(belief.root.T @ belief.root) if own else np.zeros((0, 0))
-    fit = diagnosis.final
+    fit = diagnosis.stated_fit
     rows = [_index(fit, item) for item in own]
     spread = np.sqrt(np.diag(fit.covariance))
     sigmas = {"units": "1", "long_name": "in prior standard deviations from nominal"}

@@ -226,7 +226,11 @@ def fit_rows(fit: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Errors of every fit on fitted and held-out readings, K: ``model``, ``fitted``, ``heldout``."""
     names = fits_told(fit)
     rows = [
-        {"model": name, "fitted": fit[when]["train_rmse_K"], "heldout": fit[when]["heldout_rmse_K"]}
+        {
+            "model": name,
+            "fitted": fit[when]["train_rmse_K"],
+            "heldout": fit[when].get("heldout_states_untold_rmse_K", fit[when]["heldout_rmse_K"]),
+        }
         for when, name in names.items()
     ]
     _, after, told = heldout_errors(fit)

@@ -245,6 +245,28 @@ def test_heat_that_nobody_recorded_is_found_with_its_intervals(heated):
     assert sum(item["probability"] for item in (*content["findings"], *content["alternatives"])) > 0.5
 
 
+def test_states_are_stated_and_held_against_readings_as_all_of_them_tell(machine, tmp_path):
+    """Heat for ten minutes of every half an hour: held-out stretches hold whole states."""
+    switching = record(tmp_path / "run", 3, extra=lambda time: HEAT if time % 1500.0 > 900.0 else 0.0)
+    out = tmp_path / "out"
+    content = diagnose_without_report(machine, [switching], out)
+    assert effects(content) == {("unrecorded_heat_source", "body")}
+    states = [(item["start"], item["end"]) for item in content["findings"][0]["intervals"]]
+    begins = np.arange(900.0, DURATION, 1500.0)
+    assert [start for start, _ in states] == pytest.approx(begins, abs=2.0 * STEP)
+    after = content["fit"]["after"]
+    assert after["heldout_rmse_K"] == after["heldout_states_told_rmse_K"]
+    assert after["heldout_rmse_K"] < 0.5 * after["heldout_states_untold_rmse_K"]
+    assert "hidden states" in content["fit"]["heldout"]
+    # What is written beside the readings is what is stated, but for one reading that is taken for a spike.
+    predicted, read = pd.read_csv(out / "after.csv"), pd.read_csv(switching / "data.csv")
+    held = np.zeros(len(predicted), dtype=bool)
+    for start, end in content["fit"]["heldout_s"][0]:
+        held |= (predicted["time_s"] >= start) & (predicted["time_s"] <= end)
+    error = (predicted[["Tw", "Tl", "Tb"]] - read[["Tw", "Tl", "Tb"]])[held]
+    assert np.sqrt((error**2).mean().mean()) == pytest.approx(after["heldout_rmse_K"], rel=0.1)
+
+
 def load(time):
     """Percent of a neighbouring drive, another one every 20 minutes."""
     return LOADS[min(int(time / 1200.0), len(LOADS) - 1)]

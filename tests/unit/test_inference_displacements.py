@@ -247,7 +247,9 @@ def test_an_expansion_that_is_off_is_told_in_micrometres(heated):
     slow = expected_slow_error(predictor)
     fit = Problem(predictor, known_before(predictor), slow, predictor.observations).fit()
     judgement = SimpleNamespace(verdict="consistent")
-    made = SimpleNamespace(predictor=predictor, unchanged=predictor, final=fit, null=fit, judgement=judgement)
+    made = SimpleNamespace(
+        predictor=predictor, unchanged=predictor, final=fit, stated_fit=fit, null=fit, judgement=judgement
+    )
     content = misdescription_content(made)
     (row,) = content["left_open"]
     assert (row["name"], row["channel"], row["largest_K"]) == ("expansion", "S1", 0.0)
@@ -370,7 +372,7 @@ def test_the_full_model_checks_displacements_in_micrometres(heated, monkeypatch)
     prepared = SimpleNamespace(spec=predictor.fast.spec, operators=SimpleNamespace(n_unknowns=3))
     monkeypatch.setattr(full_model_check, "prepare_machine", lambda spec: prepared)
     monkeypatch.setattr(full_model_runs, "_run", run)
-    diagnosis = SimpleNamespace(predictor=predictor, unchanged=predictor, null=fit, final=fit)
+    diagnosis = SimpleNamespace(predictor=predictor, unchanged=predictor, null=fit, stated_fit=fit)
     machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
     kept = {}
     found = full_model_check.full_model_errors(diagnosis, machine, keep=kept.__setitem__)

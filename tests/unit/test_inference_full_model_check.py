@@ -77,7 +77,7 @@ def fit_of(members, values):
 
 
 def diagnosis_of(predictor, null, final, unchanged=None):
-    return SimpleNamespace(predictor=predictor, unchanged=unchanged or predictor, null=null, final=final)
+    return SimpleNamespace(predictor=predictor, unchanged=unchanged or predictor, null=null, stated_fit=final)
 
 
 def test_a_fit_becomes_terms_values_and_factors(predictor, candidates):

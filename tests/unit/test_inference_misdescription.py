@@ -330,6 +330,7 @@ def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
             predictor=problem.predictor,
             unchanged=problem.predictor,
             final=fit,
+            stated_fit=fit,
             null=fit,
             judgement=verdict,
             wrong=wrong,
