@@ -246,11 +246,11 @@ def print_simulation(content: dict[str, Any], folder: Path) -> None:
 
 def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
     """Verdict, findings, alternatives and the fit before and after."""
-    from spindle_fem.report.diagnosis_words import fit_rows, fits_told, level
+    from spindle_fem.report.diagnosis_words import fit_rows, fits_told, level_of
 
     console = open_console()
-    mismatch, fit = content["mismatch"], content["fit"]
-    _print_marked(console, content["verdict"], f"  (p {level(mismatch['p_value'])})", "bold")
+    fit, p = content["fit"], level_of(content)
+    _print_marked(console, content["verdict"], f"  (p {p})" if p else "", "bold")
     if content["reason"]:
         console.print(content["reason"])
     for finding in content["findings"]:
@@ -260,7 +260,7 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
         table = headed_table("Not ruled out", "set", "probability", sentences=True)
         for item in content["alternatives"]:
             names = " + ".join(f"{f['effect']} at {f['component']}" for f in item["findings"])
-            table.add_row(names or "nothing", _number(item["probability"], 3))
+            table.add_row(names or "nothing missing", _number(item["probability"], 3))
         console.print(table)
     if fit["noise_K"] is not None:
         table = headed_table("Fit", "", "fitted K", "held out K")

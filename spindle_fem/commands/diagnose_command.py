@@ -125,7 +125,7 @@ class _ReportWorker:
 
     def draw(self, place: Path, content: Mapping[str, Any]) -> None:
         """Draw the figures from what is known so far."""
-        self._pictures = self._report.draw_figures(place, content)
+        self._pictures = self._report.draw_ahead(place, content)
 
     def write(self, place: Path) -> None:
         """Write the report of a folder that is complete but for it."""

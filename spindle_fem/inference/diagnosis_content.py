@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from spindle_fem.effects.framework.effect import capital
+from spindle_fem.inference import tuned
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, MISDESCRIBED_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import (
@@ -26,6 +27,7 @@ from spindle_fem.inference.missing_heat import stretches
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.verdict import Judgement
 from spindle_fem.results.run_summary import package_versions
+from spindle_fem.units import NORMAL_90_PERCENT
 
 SCHEMA = "spindle-fem/diagnosis/1"
 STATES_ARE_TOLD = "; readings there tell when hidden states were on, and nothing else of the fit"
@@ -143,18 +145,19 @@ def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, 
 
 def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The machine's own parameters before and after, those apart that no key of the definition has."""
+    fit, width = diagnosis.stated_fit, NORMAL_90_PERCENT * tuned.INTERVAL_WIDENING
     rows = []
     for coordinate in diagnosis.machine_coordinates:
         if coordinate.name.startswith((MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)):
             continue
-        low, high = diagnosis.stated_fit.interval(coordinate.name, 1.645)
+        low, high = fit.interval(coordinate.name, width)
         rows.append(
             {
                 "name": coordinate.name,
                 "prior": coordinate.value,
                 "prior_sigma": coordinate.sigma,
                 "logarithmic": coordinate.logarithmic,
-                "value": diagnosis.stated_fit.values[coordinate.name],
+                "value": fit.values[coordinate.name],
                 "low": low,
                 "high": high,
                 "unit": coordinate.unit,

@@ -296,15 +296,17 @@ def main_component(diagnosis: Diagnosis) -> str:
 
 
 def change_without(predictor: Predictor, fit: Fit, candidate: Candidate) -> float:
-    """Root mean square change of all readings when one candidate of a fit is taken away, K."""
+    """Root mean square change of all temperatures when one candidate of a fit is taken away, K."""
     rest = tuple(c for c in fit.candidates if c is not candidate)
     values = values_without(fit, candidate)
     total, number = 0.0, 0
-    for recording in range(len(predictor.recordings)):
+    for recording, own in enumerate(predictor.recordings):
         whole = predictor.predict(recording, fit.values, fit.candidates).temperature
         part = predictor.predict(recording, values, rest).temperature
-        total += float(np.sum((whole - part) ** 2))
-        number += whole.size
+        # Displacements, in µm, come after them.
+        change = (whole - part)[:, : own.temperature_count]
+        total += float(np.sum(change**2))
+        number += change.size
     return float(np.sqrt(total / max(number, 1)))
 
 
@@ -389,7 +391,8 @@ def _scores(predictor: Predictor, fit: Fit, number: int) -> list[tuple[Array, Ar
         order = np.argsort(times)
         residual = np.concatenate([o.values - o.at(predicted[:, channel]) for o in own])[order]
         variance = np.concatenate([o.bins.white**2 / o.bins.number for o in own])[order]
-        found.append((times[order], smoothed_scores(times[order], residual, variance, fit.slow, window)))
+        slow = fit.slow.of(own[0].bins.key)
+        found.append((times[order], smoothed_scores(times[order], residual, variance, slow, window)))
     return found
 
 

@@ -254,7 +254,8 @@ def _not_named(sets: _Weighed, asked: _Asked) -> Judgement:
     # The residual is there, and no set of the catalogue makes it likelier.
     p_value, reason = sets.p_value, CONTRADICTED_REASON
     if much_left:
-        p_value = float(chdtrc(len(empty.fit.residual), empty.fit.misfit))
+        # With the slow error that is left of the readings none is so large that it could not be one.
+        p_value = min(p_value, float(chdtrc(len(empty.fit.residual), empty.fit.misfit)))
         much = f"{left:.1f} times" if left > tuned.MOST_LEFT else "more than"
         reason = f"the readings differ from the model by {much} the noise, and no effect explains it"
     return Judgement("unexplained", p_value, replace(empty, probability=0.0), (), 1.0, reason, left=left)
@@ -293,13 +294,17 @@ def _named(sets: _Weighed, asked: _Asked) -> Judgement:
         and item.fit.candidates
     )
     # What a coarse machine gives up although it is likely shares what is left.
-    over = 1.0 - probability - sum(item.probability for item in alternatives)
+    other = max(0.0, 1.0 - known - nothing)
     given_up = [i for i in sets.before if i.fit.named_keys not in sets.by_all and i.fit.candidates]
-    alternatives += tuple(
-        Ranked(i.best, over * i.probability)
+    doubtful = tuple(
+        Ranked(i.best, other * i.probability)
         for i in given_up
-        if over * i.probability >= tuned.LISTED or any(i.best is one.best for one in listed)
+        if other * i.probability >= tuned.LISTED or any(i.best is one.best for one in listed)
     )
+    other = max(0.0, other - sum(item.probability for item in doubtful))
+    alternatives += doubtful
+    if nothing >= tuned.LISTED:
+        alternatives += (Ranked(sets.empty.best, nothing),)
     # What every likely set holds is sure, whether there is more or not.
     common = sum(item.probability for item in sets.ranked if holds(item.fit, chosen.fit, known_as_one))
     several = common * (1.0 - nothing) < tuned.DECIDED or bool(near)
@@ -323,9 +328,7 @@ def _named(sets: _Weighed, asked: _Asked) -> Judgement:
             f"without it: it explains {100.0 * (1.0 - (rest / without) ** 2):.0f} % of the mismatch"
         )
     told = Ranked(chosen.best, probability)
-    return Judgement(
-        verdict, sets.p_value, told, alternatives, 1.0 - known, reason, evidence, share, more, rest
-    )
+    return Judgement(verdict, sets.p_value, told, alternatives, other, reason, evidence, share, more, rest)
 
 
 def _with_one_less(chosen: Ranked, sets: _Weighed, asked: _Asked) -> list[Ranked]:

@@ -69,7 +69,7 @@ class MachineDiagnosis(FolderResult):
 
     def plot_probabilities(self) -> Figure:
         """Probability of every set of effects that was fitted to the end, and of something else."""
-        return set_probabilities(self.to_xarray())
+        return set_probabilities(self.to_xarray(), self)
 
     @property
     def improved_machine(self) -> Path:

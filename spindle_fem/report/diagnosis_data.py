@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.findings import channel_noise
 from spindle_fem.inference.hypothesis_fit import Fit
@@ -253,19 +254,25 @@ def _heat(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _sets(diagnosis: Diagnosis) -> dict[str, Any]:
-    ranked = rank(diagnosis.hypotheses, diagnosis.coarseness)
-    share = 1.0 - diagnosis.judgement.other
-    chosen = diagnosis.judgement.chosen.fit.keys
+    """Sets that were fitted to the end with the probability that is stated of them: the told one first."""
+    judgement = diagnosis.judgement
+    told = (judgement.chosen, *judgement.alternatives)
+    stated = {item.fit.keys: item.probability for item in told}
+    others = [item.fit for item in rank(diagnosis.hypotheses, diagnosis.coarseness)]
+    fits = [*(item.fit for item in told), *(fit for fit in others if fit.keys not in stated)]
     return {
-        "set_name": ("set", [hypothesis_words(item.fit) for item in ranked]),
-        "set_probability": ("set", np.array([share * item.probability for item in ranked])),
+        "set_name": ("set", [hypothesis_words(fit) for fit in fits]),
+        "set_probability": (
+            "set",
+            np.array([stated.get(fit.keys, 0.0) for fit in fits]),
+            {"long_name": "0 where it is ruled out or too small to be stated"},
+        ),
         "set_misfit": (
             "set",
-            np.array([np.sqrt(item.fit.reduced_misfit) for item in ranked]),
+            np.array([np.sqrt(fit.reduced_misfit) for fit in fits]),
             {"long_name": "root mean square of whitened residuals"},
         ),
-        "set_chosen": ("set", np.array([item.fit.keys == chosen for item in ranked]).astype(np.int8)),
-        "not_in_catalogue": ((), diagnosis.judgement.other),
+        "set_chosen": ("set", np.array([fit is told[0].fit for fit in fits]).astype(np.int8)),
     }
 
 
@@ -275,7 +282,7 @@ def _parameters(diagnosis: Diagnosis) -> dict[str, Any]:
     known = np.linalg.inv(belief.root.T @ belief.root) if own else np.zeros((0, 0))
     fit = diagnosis.stated_fit
     rows = [_index(fit, item) for item in own]
-    spread = np.sqrt(np.diag(fit.covariance))
+    spread = tuned.INTERVAL_WIDENING * np.sqrt(np.diag(fit.covariance))
     sigmas = {"units": "1", "long_name": "in prior standard deviations from nominal"}
     return {
         "parameter": [item.name for item in own],

@@ -24,15 +24,21 @@ WRAPPED = 46
 
 
 @styled
-def set_probabilities(data: xr.Dataset) -> Figure:
-    """Probability of every set of effects that was fitted to the end, and of something else."""
+def set_probabilities(data: xr.Dataset, content: Mapping[str, Any]) -> Figure:
+    """Probability of every set of effects that was fitted to the end, and of something else.
+
+    Of the set that is told, and of something else, as ``content`` states them after the full model's check.
+    """
     names = [str(n) for n in data["set_name"].values]
-    chance = [float(p) for p in data["set_probability"].values]
-    misfit = [f"misfit {value:.2f}" for value in data["set_misfit"].values]
     chosen = [bool(c) for c in data["set_chosen"].values]
+    chance = [
+        content["set_probability"] if told else float(p)
+        for told, p in zip(chosen, data["set_probability"].values, strict=True)
+    ]
+    misfit = [f"misfit {value:.2f}" for value in data["set_misfit"].values]
     names, chance, misfit = (
         [*names[:9], "something else, or another law"],
-        [*chance[:9], float(data["not_in_catalogue"].values)],
+        [*chance[:9], content["something_else_probability"]],
         [*misfit[:9], ""],
     )
     chosen = [*chosen[:9], False]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,8 +61,9 @@ CAPTIONS = {
     "displacements": "Displacements as read, the model, and what it leaves, but for where the sensor was "
     "set; shaded: not fitted.",
     "residual_map": "Root mean square residual by channel and condition.",
-    "sets": "Probability of every set of effects that was fitted to the end. Misfit: root mean square of "
-    "what it leaves of the readings, in widths of their noise and slow error.",
+    "sets": "Sets of effects that were fitted to the end, the told one first, with their probability; none "
+    "where it is ruled out or too small to be stated. Misfit: root mean square of what it leaves of the "
+    "readings, in widths of their noise and slow error.",
     "findings": "Parameters of the findings, with 90 % intervals.",
     "parameters": "The machine's own uncertain parameters, prior against posterior.",
     "where": "How well heat that is missing at one place only would explain the readings.",
@@ -70,8 +71,8 @@ CAPTIONS = {
 }
 
 
-def draw_figures(folder: str | Path, content: Mapping[str, Any]) -> dict[str, list[Illustration]]:
-    """``figures`` of a folder that holds ``diagnosis.nc``, as pictures for its report.
+def draw_ahead(folder: str | Path, content: Mapping[str, Any]) -> dict[str, list[Illustration]]:
+    """``figures`` of a folder that holds ``diagnosis.nc``, but for what the full model's check may change.
 
     Parameters
     ----------
@@ -90,10 +91,15 @@ def draw_figures(folder: str | Path, content: Mapping[str, Any]) -> dict[str, li
     """
     folder = Path(folder)
     data = _read_data(folder / "diagnosis.nc")
+    return {} if data is None else _drawn(_figures(content, data, folder), folder)
+
+
+def _drawn(figures: Iterable[tuple[str, Figure]], folder: Path) -> dict[str, list[Illustration]]:
+    """Figures saved in a folder, by kind."""
     place = folder / "figures"
     place.mkdir(exist_ok=True)
     pictures: dict[str, list[Illustration]] = {}
-    for name, figure in _figures(content, data, folder):
+    for name, figure in figures:
         path = save_png(figure, place / f"{name}.png")
         kind = name.rpartition("_recording_")[0] or name
         pictures.setdefault(kind, []).append(illustration_of(path, CAPTIONS[kind]))
@@ -108,7 +114,7 @@ def write_diagnosis_report(
     Parameters
     ----------
     pictures : mapping of kind to list of Illustration, optional
-        What :func:`draw_figures` has drawn already.
+        What :func:`draw_ahead` has drawn already.
 
     Returns
     -------
@@ -122,7 +128,9 @@ def write_diagnosis_report(
     """
     folder = Path(folder)
     content = read_content(folder / "diagnosis.json", SCHEMA, "diagnose")
-    pictures = draw_figures(folder, content) if pictures is None else pictures
+    pictures = draw_ahead(folder, content) if pictures is None else pictures
+    if (data := _read_data(folder / "diagnosis.nc")) is not None:
+        pictures = {**pictures, **_drawn([("sets", set_probabilities(data, content))], folder)}
     return replace_text(folder / "report.html", render(content, pictures))
 
 
@@ -138,11 +146,7 @@ def _read_data(path: Path) -> xr.Dataset | None:
     return data
 
 
-def _figures(
-    content: Mapping[str, Any], data: xr.Dataset | None, folder: Path
-) -> Iterator[tuple[str, Figure]]:
-    if data is None:
-        return
+def _figures(content: Mapping[str, Any], data: xr.Dataset, folder: Path) -> Iterator[tuple[str, Figure]]:
     recordings = range(data.sizes["recording"])
     many = data.sizes["recording"] > 1
 
@@ -158,7 +162,6 @@ def _figures(
     sensors = sensors_named(content)
     places = [name for name in content["mismatch"]["where"]["credible"] if name not in sensors]
     found: list[tuple[str, Figure | None]] = [
-        ("sets", set_probabilities(data)),
         ("findings", finding_intervals(content["findings"], found_words(content))),
         ("parameters", machine_parameters(data)),
     ]

@@ -15,7 +15,7 @@ from spindle_fem.report.diagnosis_words import (
     heldout_errors,
     is_one_fit,
     kelvin,
-    level,
+    level_of,
     moment,
     sensors_named,
     set_words,
@@ -42,14 +42,13 @@ _FROM_TO = (
 
 def cards(content: Mapping[str, Any]) -> Cards:
     """Headline numbers."""
-    fit, mismatch = content["fit"], content["mismatch"]
+    fit, p = content["fit"], level_of(content)
     before, after, told = heldout_errors(fit)
     error = kelvin(after) if is_one_fit(fit) else f"{kelvin(before)} → {kelvin(after)}"
     change = "" if is_one_fit(fit) else ", before → after"
-    items = [
-        {"value": content["verdict"].replace("_", " "), "name": "verdict"},
-        {"value": level(mismatch["p_value"]).removeprefix("= "), "name": "p, if nothing were missing"},
-    ]
+    items = [{"value": content["verdict"].replace("_", " "), "name": "verdict"}]
+    if p:
+        items.append({"value": p.removeprefix("= "), "name": "p, if nothing were missing"})
     if content["findings"]:
         items.append(
             {

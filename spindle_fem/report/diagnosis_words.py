@@ -152,6 +152,16 @@ def level(p_value: float) -> str:
     return f"= {significant(p_value, 2)}" if p_value >= LEAST_LEVEL else f"< {LEAST_LEVEL:g}"
 
 
+def level_of(content: Mapping[str, Any]) -> str:
+    """The p-value of a diagnosis as :func:`level` has it; empty where that says nothing.
+
+    What is unexplained by what it leaves over the noise may be as likely as not under a slow error so large.
+    """
+    p_value = content["mismatch"]["p_value"]
+    silent = content["verdict"] == "unexplained" and p_value > tuned.SIGNIFICANT
+    return "" if silent else level(p_value)
+
+
 def kelvin(value: float | None) -> str:
     """Temperature difference as text.
 
@@ -187,15 +197,18 @@ def _heat_words(content: Mapping[str, Any]) -> str:
     mismatch = content["mismatch"]
     component = mismatch["where"]["component"]
     heat = mismatch["missing_heat_W"].get(component)
-    when = _when(content) or "Overall "
     unrecorded = any(item["effect"].startswith("unrecorded_") for item in content["findings"])
     if heat is None or unrecorded:
         # An unrecorded source says itself how much; what the parameters absorb of it would confuse.
         return ""
-    more = "more" if heat["mean"] >= 0.0 else "less"
+    mean, peak = (
+        f"{abs(heat[key]):.0f} W {'more' if heat[key] >= 0.0 else 'less'}" for key in ("mean", "peak")
+    )
+    when = _when(content).rstrip()
+    above_all = f", above all {when[0].lower()}{when[1:]}" if when else ""
     return (
-        f"{when}the readings are as if {place_words(component)} gave {abs(heat['mean']):.0f} W on average "
-        f"(at most {abs(heat['peak']):.0f} W) {more} heat than modelled. "
+        f"The readings are as if {place_words(component)} gave {mean} heat than modelled in the mean of all "
+        f"time, and {peak} at the utmost{above_all}. "
     )
 
 
@@ -271,10 +284,9 @@ def checks(content: Mapping[str, Any]) -> list[str]:
 
 def confidence_words(content: Mapping[str, Any]) -> list[str]:
     """Sentences on how the answer was found and what it leaves open."""
-    mismatch, fit = content["mismatch"], content["fit"]
-    found = [
-        f"If nothing were missing, a difference as large would have the probability "
-        f"p {level(mismatch['p_value'])}.",
+    fit, p = content["fit"], level_of(content)
+    found = [f"If nothing were missing, a difference as large would have the probability p {p}."] if p else []
+    found += [
         f"Held out, never seen by the fit: {fit['heldout']}.",
     ]
     if content.get("candidates_tried"):

@@ -30,6 +30,7 @@ from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.innovations import ZERO_SIGMA
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.misdescription_content import misdescription_content
+from spindle_fem.inference.mismatch_place import change_without
 from spindle_fem.inference.missing_heat import Pattern
 from spindle_fem.inference.next_measurement import EXISTING, next_measurement, reading_covariance
 from spindle_fem.inference.opened_machine import DiagnosedMachine, with_growth
@@ -257,6 +258,16 @@ def test_an_expansion_that_is_off_is_told_in_micrometres(heated):
     assert 1.0 < row["largest_um"] < 50.0
     whole = {"verdict": "consistent", "findings": [], "misdescription": content}
     assert "µm" in str(misdescription_blocks(whole)[0].rows)
+
+
+def test_what_an_effect_changes_is_measured_on_temperatures_alone(heated):
+    with_sensor, without = (
+        Predictor(heated[0].fast, recordings)
+        for recordings in (with_growth(heated[0]).recordings, heated[0].recordings)
+    )
+    heat = heated[1]
+    fit = SimpleNamespace(candidates=(heat,), values={heat.amplitude: 200.0})
+    assert change_without(with_sensor, fit, heat) == pytest.approx(change_without(without, fit, heat))
 
 
 def test_predictions_are_written_in_the_units_of_their_channels(heated, tmp_path):

@@ -36,7 +36,8 @@ from spindle_fem.inference.prepared_problem import (
 from spindle_fem.inference.worker_processes import Workers
 from spindle_fem.machine.view.meridian_places import centre_of
 from spindle_fem.report.diagnosis_data import diagnosis_dataset
-from spindle_fem.report.diagnosis_report import SCHEMA, draw_figures, write_diagnosis_report
+from spindle_fem.report.diagnosis_odds import set_probabilities
+from spindle_fem.report.diagnosis_report import SCHEMA, draw_ahead, write_diagnosis_report
 from spindle_fem.report.diagnosis_tables import where_text
 from spindle_fem.report.diagnosis_words import place_named, verdict_sentence
 from tests.support.diagnosed_spindle import (
@@ -279,6 +280,7 @@ def content_of(diagnosis, before, after, proposal):
         "mismatch": {"p_value": judgement.p_value, "channels": channels, **where_of(diagnosis).to_json()},
         "findings": findings_of(diagnosis, judgement.chosen, split=True),
         "set_probability": judgement.chosen.probability,
+        "something_else_probability": judgement.other,
         "slow_error": {"sigma_K": diagnosis.final.slow.sigma, "time_s": diagnosis.final.slow.time},
         "alternatives": [
             {"findings": findings_of(diagnosis, item, split=False), "probability": item.probability}
@@ -361,14 +363,26 @@ def test_figures_may_be_drawn_before_the_report(reported, tmp_path):
     for name in ("diagnosis.nc", "diagnosis.json", "improved_machine.toml"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     known = {key: value for key, value in content.items() if key != "next_measurement"}
-    pictures = draw_figures(tmp_path, known)
-    assert {item.name for item in (tmp_path / "figures").iterdir()} == {
-        item.name for item in (folder / "figures").iterdir()
-    }
+    pictures = draw_ahead(tmp_path, known)
+    ahead = {item.name for item in (tmp_path / "figures").iterdir()}
+    assert ahead == {item.name for item in (folder / "figures").iterdir()} - {"sets.png"}
     assert write_diagnosis_report(tmp_path, pictures).read_text(encoding="utf-8") == path.read_text(
         encoding="utf-8"
     )
-    assert "data:image" not in write_diagnosis_report(tmp_path, {}).read_text(encoding="utf-8")
+    # What the full model's check may change is drawn with the report.
+    assert write_diagnosis_report(tmp_path, {}).read_text(encoding="utf-8").count("data:image") == 1
+
+
+def test_chart_of_sets_has_the_probabilities_that_are_stated(reported):
+    folder, content, _ = reported
+    checked = content | {"set_probability": 0.31, "something_else_probability": 0.62}
+    figure = set_probabilities(xr.load_dataset(folder / "diagnosis.nc"), checked)
+    drawn = [bar.get_width() for bar in figure.axes[0].patches]
+    stated = [item["probability"] for item in content["alternatives"]]
+    assert drawn[0] == 0.31
+    assert drawn[1 : 1 + len(stated)] == pytest.approx(stated)
+    assert drawn[-1] == 0.62
+    assert not any(drawn[1 + len(stated) : -1])
 
 
 def test_what_to_measure_next_is_the_same_from_another_process(heated, proposal):

@@ -173,7 +173,9 @@ def test_what_few_consistent_recordings_show_is_ambiguous_where_evidence_prefers
     assert (said.verdict, said.reason) == ("ambiguous", NOTHING_REASON)
     assert said.chosen.fit.candidates == (dear,)
     assert said.chosen.probability <= tuned.STILL_POSSIBLE
-    assert said.chosen.probability + said.other == pytest.approx(1.0)
+    (nothing,) = said.alternatives
+    assert (nothing.fit is none.fit, nothing.probability) == (True, tuned.STILL_POSSIBLE)
+    assert said.chosen.probability + nothing.probability + said.other == pytest.approx(1.0)
     # Where evidence prefers something as well, it is said.
     clear = [none, hypothesis(dear, misfit=400.0, evidence=-200.0, log_prior=-0.5)]
     assert verdict(*clear).verdict == "missing_physics"

@@ -172,6 +172,7 @@ def test_what_is_likely_but_leaves_more_is_listed_with_a_share_of_what_is_left()
     (other,) = found.alternatives
     assert other.fit.keys == likely.keys
     assert tuned.LISTED < other.probability < 1.0 - found.chosen.probability
+    assert found.chosen.probability + other.probability + found.other == pytest.approx(1.0)
 
 
 def test_what_one_set_gains_over_another_of_its_size_counts_less_where_the_model_is_coarse():

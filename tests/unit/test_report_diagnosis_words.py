@@ -8,7 +8,7 @@ import pytest
 from spindle_fem.commands.console import print_diagnosis
 from spindle_fem.inference.next_measurement import lead_words
 from spindle_fem.report.diagnosis_tables import cards, channel_table, fit_table, set_tables
-from spindle_fem.report.diagnosis_words import checks, verdict_sentence
+from spindle_fem.report.diagnosis_words import checks, confidence_words, verdict_sentence
 
 STATEMENT = "312 W of heat enters the housing."
 
@@ -79,6 +79,26 @@ def test_what_switches_is_held_against_readings_that_tell_when(capsys):
     assert rows[1:] == [["after", "0.186", "0.571"], [f"after, {words}", "–", "0.210"]]
     print_diagnosis(told, Path())
     assert f"after, {words}" in capsys.readouterr().out
+
+
+def test_missing_heat_is_told_in_the_mean_and_at_its_peak_each_with_its_sign():
+    told = content("missing_physics")
+    told["findings"][0]["effect"] = "grease_churning"
+    told["mismatch"]["missing_heat_W"] = {"housing": {"mean": -2.8, "peak": 28.9}}
+    words = "gave 3 W less heat than modelled in the mean of all time, and 29 W more at the utmost"
+    assert f"{words}. " in verdict_sentence(told)
+    told["mismatch"]["where"]["condition"] = "3000-4000 rpm"
+    assert f"{words}, above all at 3000-4000 rpm. " in verdict_sentence(told)
+
+
+def test_a_p_value_that_says_nothing_beside_what_is_left_is_not_stated(capsys):
+    told = content("unexplained")
+    for p_value, stated in ((0.0001, True), (0.7, False)):
+        told["mismatch"]["p_value"] = p_value
+        print_diagnosis(told, Path())
+        assert ("(p " in capsys.readouterr().out) == stated
+        assert any("nothing were missing" in item["name"] for item in cards(told).items) == stated
+        assert any("nothing were missing" in words for words in confidence_words(told)) == stated
 
 
 def test_probabilities_are_shown_beside_sets_of_long_names(capsys):
