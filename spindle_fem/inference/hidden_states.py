@@ -12,6 +12,7 @@ from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.hypothesis_fit import Fit, Problem, candidate_coordinates
 from spindle_fem.inference.innovations import ZERO_SIGMA
 from spindle_fem.inference.missing_heat import Pattern
+from spindle_fem.inference.reading_noise import key_of
 from spindle_fem.inference.switching_model import LinearAnswer, Readings
 
 Array = NDArray[np.float64]
@@ -42,8 +43,10 @@ def answer_of(base: BaseRun, pattern: Pattern) -> LinearAnswer:
         loss.append(taken if pattern.cooling else np.zeros_like(taken))
     begins = np.zeros(steps, dtype=bool)
     begins[[0, *base.drive.restarts]] = True
-    outputs = run.operators[int(run.step_class[0])].outputs[base.columns]
-    return LinearAnswer(np.array(advance), np.array(loss), group, entering, begins, np.array(outputs))
+    # As BaseRun.outputs has it: an outlet reads otherwise at another flow.
+    classes, reads = np.unique(np.append(run.step_class[1:], run.step_class[-1]), return_inverse=True)
+    outputs = np.array([run.operators[int(number)].outputs[base.columns] for number in classes])
+    return LinearAnswer(np.array(advance), np.array(loss), group, entering, begins, reads, outputs)
 
 
 def without(fit: Fit, left_out: Candidate) -> tuple[tuple[Candidate, ...], dict[str, float]]:
@@ -87,7 +90,7 @@ def readings_about(
         slopes = np.linalg.solve(root.T, by.reshape(-1, by.shape[2]).T).T.reshape(by.shape)
     usable = recording.usable & (True if everything else predictor.use[number][:, None])
     owner = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), recording.times)
-    slow = [problem.slow.of(channel) for channel in range(usable.shape[1])]
+    slow = [problem.slow.of(key_of(recording, channel)) for channel in range(usable.shape[1])]
     residual = np.full((len(grid), usable.shape[1]), np.nan)
     variance = np.ones_like(residual)
     for channel in range(usable.shape[1]):

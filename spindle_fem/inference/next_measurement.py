@@ -40,7 +40,7 @@ from spindle_fem.inference.further_tests import (
 from spindle_fem.inference.growth_misdescriptions import EXPANSION_SIGMA
 from spindle_fem.inference.hypothesis import Ranked
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit
-from spindle_fem.inference.reading_noise import SlowError
+from spindle_fem.inference.reading_noise import SlowError, key_of
 from spindle_fem.inference.set_odds import rank
 from spindle_fem.units import ZERO_CELSIUS_K
 
@@ -244,7 +244,7 @@ def evaluate(
                 grown = EXPANSION_SIGMA * answers[0].readings[:, channel]
                 noise.append(usual_of(FURTHER_SLOW, counted_from=begin) + np.outer(grown, grown))
             elif read <= channel < count:
-                noise.append(usual_of(slow.of(channel - count), counted_from=begin))
+                noise.append(usual_of(slow.of(key_of(recording, channel)), counted_from=begin))
             else:
                 noise.append(usual_of(slow))
         for position in (None, *range(len(places))):

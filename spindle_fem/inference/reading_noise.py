@@ -98,8 +98,7 @@ class ChannelBins:
     white : float, [K]
         Noise of a single reading, rounding included.
     key : int
-        By which a slow error of its own is known: the channel, or, of a displacement, in µm, the place
-        from the end among the columns of the recording, below 0.
+        By which a slow error of its own is known, as :func:`key_of` gives it.
     """
 
     channel: int
@@ -142,6 +141,15 @@ class ChannelBins:
         return np.linalg.cholesky(covariance)
 
 
+def key_of(recording: Recording, channel: int) -> int:
+    """By which the slow error of a channel is known: itself.
+
+    Of a displacement, in µm, the place from the end among the columns of the recording, below 0.
+    """
+    every = len(recording.temperature_names)
+    return channel if channel < recording.temperature_count else channel - every
+
+
 def channel_bins(
     recording: Recording, use: NDArray[np.bool_] | None = None, *, width: float | None = None
 ) -> tuple[ChannelBins, ...]:
@@ -173,8 +181,7 @@ def channel_bins(
         np.minimum.at(first, owner, times[rows])
         np.maximum.at(last, owner, times[rows])
         spacing = (last - first) / np.maximum(number - 1.0, 1.0)
-        relative = recording.temperature_names[channel] in recording.displacement_names
-        key = channel - len(recording.temperature_names) if relative else channel
+        key = key_of(recording, channel)
         found.append(ChannelBins(channel, rows, owner, mean_time, number, spacing, white, key))
     return tuple(found)
 

@@ -101,7 +101,7 @@ def innovations(values, known, slopes, kept, gain, total):
 
 @njit(**OPTIONS)
 def follow(
-    residual, known, slopes, kept, gain, total, advance, loss, group, entering, begins, outputs,
+    residual, known, slopes, kept, gain, total, advance, loss, group, entering, begins, reads, outputs,
     log_moves, condition, sizes, courses, after,
 ):  # fmt: skip
     """Follow the most likely courses; see :meth:`ReadingFilter.courses`."""
@@ -132,7 +132,7 @@ def follow(
     count = 1
     last[0], before[0] = -1, -2
     for t in range(steps):
-        a, b = advance[group[t]], loss[group[t]]
+        a, b, read = advance[group[t]], loss[group[t]], outputs[reads[t]]
         q = condition[t]
         children = 0
         for h in range(count):
@@ -164,7 +164,7 @@ def follow(
                         continue
                     apart = residual[t, j] - next_mean[c, j]
                     for i in range(n):
-                        apart -= outputs[j, i] * next_state[c, i]
+                        apart -= read[j, i] * next_state[c, i]
                     for k in range(own):
                         apart -= slopes[t, j, k] * next_mean[c, channels + k]
                     gained -= 0.5 * apart**2 / total[t, j]

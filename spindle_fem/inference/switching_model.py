@@ -58,7 +58,9 @@ class LinearAnswer:
         What a unit adds to the state by the end of each step.
     begins : (T,) bool ndarray
         Steps before which the state is given anew.
-    outputs : (c, n) ndarray
+    reads : (T,) int ndarray
+        Class of ``outputs`` at the end of every step.
+    outputs : (q, c, n) ndarray
         Channels from the state.
     """
 
@@ -67,7 +69,15 @@ class LinearAnswer:
     group: Whole
     entering: Array
     begins: NDArray[np.bool_]
+    reads: Whole
     outputs: Array
+
+    def read(self, states: Array) -> Array:
+        """Channels (T, c) from states (T, n) at the ends of the steps."""
+        found = np.empty((len(states), self.outputs.shape[1]))
+        for number, outputs in enumerate(self.outputs):
+            found[self.reads == number] = states[self.reads == number] @ outputs.T
+        return found
 
     @property
     def largest(self) -> float:
@@ -225,6 +235,7 @@ class ReadingFilter:
             answer.group,
             answer.entering,
             answer.begins,
+            answer.reads,
             np.ascontiguousarray(answer.outputs),
             chain.log_moves(len(sizes)),
             chain.condition,
@@ -330,9 +341,9 @@ def sizes_of(
         answer.advance, answer.loss, answer.group, answer.entering, answer.begins, level, sizes
     )
     columns = np.stack(
-        [readings.innovations(slope @ answer.outputs.T).ravel() for slope in slopes.transpose(1, 0, 2)],
+        [readings.innovations(answer.read(slope)).ravel() for slope in slopes.transpose(1, 0, 2)],
         axis=1,
     )
-    left = (readings.innovations() - readings.innovations(states @ answer.outputs.T)).ravel()
+    left = (readings.innovations() - readings.innovations(answer.read(states))).ravel()
     covariance = np.linalg.inv(columns.T @ columns + np.eye(len(sizes)) * spread**-2)
     return covariance @ (columns.T @ (left + columns @ sizes)), float(covariance[0, 0] ** 0.5)

@@ -16,7 +16,7 @@ from spindle_fem.inference.innovations import InnovationFilter
 from spindle_fem.inference.missing_heat import conditions_of
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.prepared_problem import Calibrated, start_coordinates
-from spindle_fem.inference.reading_noise import SlowError
+from spindle_fem.inference.reading_noise import SlowError, key_of
 from spindle_fem.recordings.align import LONG_GAP_SECONDS, LONG_GAP_STEPS, Recording
 from spindle_fem.recordings.recording_window import piece_of
 
@@ -160,9 +160,7 @@ class WatchedMachine:
         self.coordinates.begin(start_coordinates(self.run.begins(piece)))
         self.run.restart()
         self._kelvins, every = piece.temperature_count, len(self.white)
-        slow = [
-            self.slow.of(channel if channel < self._kelvins else channel - every) for channel in range(every)
-        ]
+        slow = [self.slow.of(key_of(piece, channel)) for channel in range(every)]
         beside = [(i, self._beside[p]) for i, p in enumerate(piece.probes) if p in self._beside]
         self._filter = InnovationFilter(
             self.coordinates.covariance, slow, range(self._kelvins, every), beside

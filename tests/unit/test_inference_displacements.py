@@ -285,41 +285,6 @@ def test_a_displacement_expects_an_error_of_its_own_size(heated):
     assert (slow.sigma, slow.of(0).sigma) == (EXPECTED_SLOW.sigma, EXPECTED_SLOW.sigma)
 
 
-def drawn_lines(figure):
-    """What is drawn of the only channel: readings, before, after; then what each leaves."""
-    upper, lower = figure.axes
-    return [line.get_ydata() for line in upper.lines], [line.get_ydata() for line in lower.lines[1:]]
-
-
-def test_displacements_are_drawn_in_micrometres_beside_both_models():
-    times = np.arange(0.0, 3600.0, 60.0)
-    read = 1e-6 * np.linspace(0.0, 12.0, times.size)
-    read[7] = np.nan
-    along = ("stamp", "displacement_name")
-    data = xr.Dataset(
-        {
-            "time": ("stamp", times),
-            "recording_index": ("stamp", np.zeros(times.size, dtype=int)),
-            "held_out": ("stamp", np.zeros(times.size, dtype=int)),
-            "displacement": (along, read[:, None]),
-            "displacement_before": (along, read[:, None] - 3e-6),
-            "displacement_after": (along, read[:, None]),
-            "displacement_noise": (("recording", "displacement_name"), [[0.3e-6]]),
-            "start_stamp": ("recording", [""]),
-        },
-        {"displacement_name": ["S1"], "recording": ["nose"]},
-    )
-    figure = displaced_before_after(data, 0)
-    (shown, before, after), (left_before, left_after) = drawn_lines(figure)
-    assert shown == pytest.approx(1e6 * np.delete(read, 7))
-    assert np.nanmax(after - before) == pytest.approx(3.0)
-    assert left_before == pytest.approx(3.0)
-    assert left_after == pytest.approx(0.0, abs=1e-9)
-    assert [axes.get_ylabel() for axes in figure.axes] == ["µm", "residual / µm"]
-    assert displaced_before_after(data.drop_vars("displacement"), 0) is None
-    assert displaced_before_after(data.assign(displacement=data["displacement"] * np.nan), 0) is None
-
-
 def test_heating_follows_from_temperatures_alone(recording):
     shrinking = replace(recording, displacements=-50.0 * recording.displacements)
     assert operating_conditions(with_displacements(shrinking)).names == ("heating",)
@@ -361,7 +326,9 @@ def test_the_zero_of_a_displacement_is_free_while_a_state_is_sought(heated):
     ours = float(np.sum(ReadingFilter(bare).innovations() ** 2))
     seen = np.isfinite(only[:, 2])
     times, values = np.cumsum(found.steps)[seen], only[seen, 2]
-    own = slow.of(2)
+    own = slow.of(-1)
+    assert (found.slow_sigma[2], found.slow_sigma[0]) == (own.sigma, slow.of(0).sigma)
+    assert own.sigma > slow.of(0).sigma
     apart = np.abs(times[:, None] - times)
     covariance = own.sigma**2 * np.exp(-apart / own.time) + np.diag(found.variance[seen, 2]) + ZERO_SIGMA**2
     assert ours == pytest.approx(values @ np.linalg.solve(covariance, values), rel=1e-6)

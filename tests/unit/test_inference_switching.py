@@ -31,7 +31,8 @@ def one_mass(conductance: bool = False, capacity: float = CAPACITY) -> LinearAns
         np.zeros(STEPS, dtype=np.int64),
         np.full((STEPS, 1), -20.0 * unit if conductance else unit),
         np.arange(STEPS) == 0,
-        np.ones((1, 1)),
+        np.zeros(STEPS, dtype=np.int64),
+        np.ones((1, 1, 1)),
     )
 
 
