@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from spindle_fem.effects.framework.effect import capital
-from spindle_fem.inference import tuned
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, MISDESCRIBED_PREFIX
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.findings import (
@@ -145,12 +144,11 @@ def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, 
 
 def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The machine's own parameters before and after, those apart that no key of the definition has."""
-    fit, width = diagnosis.stated_fit, NORMAL_90_PERCENT * tuned.INTERVAL_WIDENING
-    rows = []
+    fit, rows = diagnosis.stated_fit, []
     for coordinate in diagnosis.machine_coordinates:
         if coordinate.name.startswith((MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)):
             continue
-        low, high = fit.interval(coordinate.name, width)
+        low, high = fit.stated_interval(coordinate.name, NORMAL_90_PERCENT)
         rows.append(
             {
                 "name": coordinate.name,

@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import Candidate, Reported, in_intervals, place_words
+from spindle_fem.effects.framework.effect import (
+    Candidate,
+    Reported,
+    in_intervals,
+    place_words,
+    quantity,
+)
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
@@ -24,6 +30,8 @@ Array = NDArray[np.float64]
 
 # Draws of the posterior from which intervals are read.
 DRAWS = 400
+# Sizes of intervals are said one by one where there are no more than these, and differ by more than this.
+MOST_SIZES, SAME_SIZE = 6, 1.05
 
 
 def candidate_values(candidate: Candidate, values: Mapping[str, float]) -> dict[str, float]:
@@ -107,7 +115,10 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
     law = candidate.effect, followed_name(candidate)
     elsewhere = [c for c in fit.candidates if c is not candidate and (c.effect, followed_name(c)) == law]
     words = "".join(f" It enters at {place_words(c.component)} as well." for c in elsewhere if law[1])
-    if state is not None:
+    if state is None and intervals:
+        unit = parameters[candidate.amplitude.rpartition(".")[2]]["unit"]
+        words += sizes_words([item["value"] for item in intervals], unit)
+    elif state is not None:
         words += state.words
         intervals = [
             item | {"probability": share} for item, share in zip(intervals, state.probability, strict=True)
@@ -124,6 +135,17 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
         "statement": effect.statement(candidate, reported) + words,
         "check": effect.check_of(candidate),
     }
+
+
+def sizes_words(sizes: Sequence[float], unit: str) -> str:
+    """Sizes of a few intervals as a sentence; empty where they are many, or all of one size.
+
+    >>> sizes_words([34.83, 147.5], "W/K"), sizes_words([39.0, 40.0], "W")
+    (' One after the other: 34.8 W/K, 148 W/K.', '')
+    """
+    if not 1 < len(sizes) <= MOST_SIZES or max(sizes) <= SAME_SIZE * min(sizes):
+        return ""
+    return f" One after the other: {', '.join(quantity(Reported(size, unit)) for size in sizes)}."
 
 
 def _named(diagnosis: Diagnosis, candidate: Candidate) -> dict[str, str]:

@@ -119,11 +119,30 @@ class Fit:
         """Misfit for each datum."""
         return self.misfit / max(len(self.residual), 1)
 
+    @property
+    def stated_sigmas(self) -> Array:
+        """Standard deviations as they are stated of the coordinates, in those of their priors, (n,).
+
+        What the readings told beyond what was known counts less: a model that is not exact has other best
+        parameters in another duty.
+        """
+        known = np.ones(len(self.position))
+        machine = len(self.known.coordinates)
+        known[:machine] = 1.0 / np.diag(np.linalg.inv(self.known.root.T @ self.known.root))
+        told = np.maximum(1.0 / np.diag(self.covariance) - known, 0.0)
+        return (known + told / tuned.INTERVAL_WIDENING**2) ** -0.5
+
     def interval(self, name: str, level_sigmas: float) -> tuple[float, float]:
         """Values at ``level_sigmas`` posterior standard deviations to either side."""
+        return self._interval(name, level_sigmas, np.sqrt(np.diag(self.covariance)))
+
+    def stated_interval(self, name: str, level_sigmas: float) -> tuple[float, float]:
+        """Values at ``level_sigmas`` of :attr:`stated_sigmas` to either side."""
+        return self._interval(name, level_sigmas, self.stated_sigmas)
+
+    def _interval(self, name: str, level_sigmas: float, sigmas: Array) -> tuple[float, float]:
         index = next(i for i, c in enumerate(self.coordinates) if c.name == name)
-        coordinate = self.coordinates[index]
-        spread = level_sigmas * float(np.sqrt(self.covariance[index, index]))
+        coordinate, spread = self.coordinates[index], level_sigmas * float(sigmas[index])
         ends = [
             coordinate.at(
                 float(np.clip(self.position[index] + sign * spread, coordinate.low, coordinate.high))

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
-from spindle_fem.inference import tuned
-from spindle_fem.inference.calibration import LEVEL
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.misdescription import EVERY_CHANNEL, Misdescription
 from spindle_fem.inference.predictor import Predictor
+from spindle_fem.units import NORMAL_90_PERCENT
 
 # Directions that are listed: those moved by this many standard deviations of their priors, so many at most.
 MOVED, MOST_LISTED = 0.7, 8
@@ -51,7 +49,7 @@ def _row(predictor: Predictor, fit: Fit, item: Misdescription) -> dict[str, Any]
     """One direction in one fit."""
     late = _late_already(predictor, item)
     value = fit.values[item.coordinate] + late
-    low, high = fit.interval(item.coordinate, float(ndtri(0.5 + 0.5 * LEVEL)) * tuned.INTERVAL_WIDENING)
+    low, high = fit.stated_interval(item.coordinate, NORMAL_90_PERCENT)
     largest, channel, swing, sensor = 0.0, "", 0.0, ""
     for number, recording in enumerate(predictor.recordings):
         column = predictor.column_of(number, item.coordinate)

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import Coordinate
+from spindle_fem.inference.diagnosis import overlapping_components
 from spindle_fem.inference.findings import channel_noise
 from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.like_sets import are_alike
 from spindle_fem.inference.mismatch_place import component_shares
 from spindle_fem.inference.next_measurement import hypothesis_words
 from spindle_fem.inference.set_odds import rank
@@ -254,12 +255,16 @@ def _heat(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _sets(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Sets that were fitted to the end with the probability that is stated of them: the told one first."""
-    judgement = diagnosis.judgement
+    """Sets that were fitted to the end with the probability that is stated of them: the told one first.
+
+    Without those that are one answer with a stated one, as a bearing with its set.
+    """
+    judgement, overlapping = diagnosis.judgement, overlapping_components(diagnosis.view)
     told = (judgement.chosen, *judgement.alternatives)
     stated = {item.fit.keys: item.probability for item in told}
     others = [item.fit for item in rank(diagnosis.hypotheses, diagnosis.coarseness)]
-    fits = [*(item.fit for item in told), *(fit for fit in others if fit.keys not in stated)]
+    fits = [item.fit for item in told]
+    fits += [fit for fit in others if not any(are_alike(fit, one.fit, overlapping) for one in told)]
     return {
         "set_name": ("set", [hypothesis_words(fit) for fit in fits]),
         "set_probability": (
@@ -282,12 +287,14 @@ def _parameters(diagnosis: Diagnosis) -> dict[str, Any]:
     known = np.linalg.inv(belief.root.T @ belief.root) if own else np.zeros((0, 0))
     fit = diagnosis.stated_fit
     rows = [_index(fit, item) for item in own]
-    spread = tuned.INTERVAL_WIDENING * np.sqrt(np.diag(fit.covariance))
+    spread = fit.stated_sigmas
     sigmas = {"units": "1", "long_name": "in prior standard deviations from nominal"}
     return {
         "parameter": [item.name for item in own],
         "parameter_nominal": ("parameter", np.array([item.value for item in own])),
         "parameter_prior_sigma": ("parameter", np.array([item.sigma for item in own])),
+        "parameter_low": ("parameter", np.array([item.low for item in own]), sigmas),
+        "parameter_high": ("parameter", np.array([item.high for item in own]), sigmas),
         "parameter_logarithmic": ("parameter", np.array([item.logarithmic for item in own]).astype(np.int8)),
         "parameter_unit": ("parameter", [item.unit for item in own]),
         "parameter_known": ("parameter", np.asarray(belief.mean), sigmas),

@@ -16,6 +16,7 @@ from spindle_fem.report.diagnosis_charts import NORMAL_90
 from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, pixel_axes, set_title, styled
 from spindle_fem.report.parameter_words import parameter_words, worth_showing
 from spindle_fem.report.read_against_predicted import HELD
+from spindle_fem.report.table_rows import with_interval
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,14 +108,11 @@ def finding_intervals(findings: Sequence[Mapping[str, Any]], what: str = "what w
         label = f"{item['effect'].replace('_', ' ')} ({item['component'].replace('_', ' ')}): "
         figure.text(640.0 / 1600.0, y, label + name.replace("_", " "), ha="right", va="center", fontsize=9.0)
         unit = str(value["unit"]).replace("degC", "°C")
-        text = f"{_short(middle)} {unit}  [{_short(low)}, {_short(high)}]"
+        value_text, low_text, high_text = with_interval(middle, low, high)
+        text = f"{value_text} {unit}  [{low_text}, {high_text}]"
         figure.text(1300.0 / 1600.0, y, text, va="center", fontsize=9.0)
     set_title(figure, f"{capital(what)}, in numbers", "Dot: most probable value; bar: 90 % interval.")
     return figure
-
-
-def _short(value: float) -> str:
-    return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
 
 
 @styled
@@ -128,7 +126,7 @@ def machine_parameters(data: xr.Dataset) -> Figure | None:
     data = data.isel(parameter=shown)
     names = [names[i] for i in shown]
     known, known_sigma = data["parameter_known"].values, data["parameter_known_sigma"].values
-    fitted, fitted_sigma = data["parameter_fitted"].values, data["parameter_fitted_sigma"].values
+    fitted = data["parameter_fitted"].values
     recordings = [str(n) for n in data["recording"].values]
     labels = [textwrap.fill(parameter_words(name, recordings), WRAPPED) for name in names]
     row = 18.0 + 24.0 * max(label.count("\n") + 1 for label in labels)
@@ -151,7 +149,7 @@ def machine_parameters(data: xr.Dataset) -> Figure | None:
     bars = axes.errorbar(
         fitted,
         at + 0.17 * calibrated,
-        xerr=NORMAL_90 * fitted_sigma,
+        xerr=np.abs(_ends(data) - fitted),
         fmt="o",
         color=CYCLE[0],
         markersize=4.5,
@@ -179,18 +177,23 @@ def machine_parameters(data: xr.Dataset) -> Figure | None:
     return figure
 
 
+def _ends(data: xr.Dataset) -> np.ndarray:
+    """Ends of the 90 % intervals of fitted parameters within their bounds, (2, n), in prior deviations."""
+    fitted, width = data["parameter_fitted"].values, NORMAL_90 * data["parameter_fitted_sigma"].values
+    ends = np.array([fitted - width, fitted + width])
+    # Folders of before have no bounds.
+    bounded = "parameter_low" in data
+    return np.clip(ends, data["parameter_low"].values, data["parameter_high"].values) if bounded else ends
+
+
 def _amount(item: xr.Dataset) -> str:
     nominal, sigma = float(item["parameter_nominal"].values), float(item["parameter_prior_sigma"].values)
-    ends = [
-        float(item["parameter_fitted"].values)
-        + sign * NORMAL_90 * float(item["parameter_fitted_sigma"].values)
-        for sign in (0.0, -1.0, 1.0)
-    ]
+    places = [float(item["parameter_fitted"].values), *_ends(item).tolist()]
     if int(item["parameter_logarithmic"].values):
-        middle, low, high = (nominal * math.exp(sigma * end) for end in ends)
-        return f"× {middle:.2f} [{low:.2f}, {high:.2f}]"
-    middle, low, high = (nominal + sigma * end for end in ends)
-    unit = str(item["parameter_unit"].values)
+        told = [nominal * math.exp(sigma * place) for place in places]
+        return "× {} [{}, {}]".format(*with_interval(*told))
+    told, unit = [nominal + sigma * place for place in places], str(item["parameter_unit"].values)
     if unit == "m":
-        middle, low, high, unit = 1e3 * middle, 1e3 * low, 1e3 * high, "mm"
-    return f"{middle:+.2f} {unit} [{low:+.2f}, {high:+.2f}]"
+        told, unit = [1e3 * value for value in told], "mm"
+    middle, low, high = with_interval(*told)
+    return f"{middle} {unit} [{low}, {high}]"

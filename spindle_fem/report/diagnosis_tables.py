@@ -30,6 +30,7 @@ from spindle_fem.report.table_rows import (
     significant,
     table_of,
     whole,
+    with_interval,
     words,
 )
 
@@ -172,13 +173,13 @@ def set_tables(content: Mapping[str, Any]) -> list[Any]:
         fields = (
             *effect,
             words("parameter", "parameter"),
-            rounded("value", "value"),
-            whole("90 % interval", lambda item: f"{significant(item['low'])} to {significant(item['high'])}"),
+            *_value_and_interval("value"),
             words("unit", lambda item: str(item["unit"]).replace("degC", "°C")),
         )
         blocks.append(table_of(fields, parameters, f"{capital(found_words(content))}."))
     if intervals:
-        blocks.append(table_of((*effect, *_FROM_TO), intervals, "When it is on."))
+        size = words("size", lambda item: _size_words(item) if "value" in item else "")
+        blocks.append(table_of((*effect, *_FROM_TO, size), intervals, "When it is on, and how much."))
     if content["alternatives"]:
         fields = (
             words("instead", lambda item: set_words(item["findings"])),
@@ -205,8 +206,7 @@ def parameter_tables(content: Mapping[str, Any]) -> list[Table]:
     fields = (
         words("parameter", lambda item: parameter_words(item["name"], recordings)),
         rounded("before", "prior"),
-        rounded("after", "value"),
-        whole("90 % interval", lambda item: f"{significant(item['low'])} to {significant(item['high'])}"),
+        *_value_and_interval("after"),
         words("unit", "unit"),
     )
     return [table_of(fields, rows, "All of them; diagnosis.nc has the directions of the definition too.")]
@@ -271,8 +271,9 @@ def next_blocks(content: Mapping[str, Any]) -> list[Any]:
             whole("± 1 σ", lambda option: _in_its_unit(option, "sigma")),
             fixed("after / min", lambda option: option["after_s"] / 60.0, 0),
         )
-        between = " and ".join(item.get("between", [])[:2])
-        caption = f"The proposal first, then the most telling. Difference between {between}."
+        caption = "The proposal first, then the most telling."
+        if len(between := item.get("between", [])) > 1:
+            caption += f" Difference: what is read if it is {between[1]}, less what if it is {between[0]}."
         blocks.append(table_of(fields, item["options"], caption))
     blocks += [
         Text(f"Not simulated: {failed['condition']} ({failed['reason']})")
@@ -286,6 +287,23 @@ def _largest(row: Mapping[str, Any]) -> str:
     if row["largest_K"] or "largest_um" not in row:
         return f"{row['largest_K']:.2f} K"
     return f"{row['largest_um']:.2f} µm"
+
+
+def _value_and_interval(title: str) -> tuple[Field, Field]:
+    """Columns of a value and of its interval."""
+
+    def told(item: Mapping[str, Any]) -> tuple[str, str, str]:
+        return with_interval(item["value"], item["low"], item["high"])
+
+    return whole(title, lambda item: told(item)[0]), whole(
+        "90 % interval", lambda item: " to ".join(told(item)[1:])
+    )
+
+
+def _size_words(item: Mapping[str, Any]) -> str:
+    """Size in one interval of a finding, W or W/K."""
+    unit = next(value["unit"] for value in item["parameters"].values() if value["unit"] in ("W", "W/K"))
+    return f"{significant(item['value'])} {unit}"
 
 
 def _in_its_unit(option: Mapping[str, Any], key: str) -> str:

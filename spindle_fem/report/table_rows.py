@@ -45,6 +45,17 @@ def significant(value: Any, digits: int = 3) -> str:
     return text.replace("-", "−")
 
 
+def with_interval(value: float, low: float, high: float) -> tuple[str, str, str]:
+    """A value and the ends of its interval with as many digits as tell them apart.
+
+    >>> with_interval(1.0084, 1.0062, 1.0113), with_interval(91.9, 34.41, 216.2)
+    (('1.0084', '1.0062', '1.0113'), ('91.9', '34.4', '216'))
+    """
+    largest, span = max(map(abs, (value, low, high))), high - low
+    digits = 3 if not 0.0 < span < largest else min(8, max(3, 2 + math.ceil(math.log10(largest / span))))
+    return significant(value, digits), significant(low, digits), significant(high, digits)
+
+
 def plain(name: Any) -> str:
     """Name of an effect, a place or a parameter with spaces."""
     return str(name).replace("_", " ")

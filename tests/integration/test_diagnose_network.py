@@ -239,6 +239,8 @@ def test_heat_that_nobody_recorded_is_found_with_its_intervals(heated):
     assert {(row["effect"], row["component"], row["unit"]) for row in rows} == {
         ("unrecorded_heat_source", "body", "W")
     }
+    # Both are of one size, which the statement gives once.
+    assert "One after the other" not in finding["statement"]
     assert content["mismatch"]["where"]["component"] == "body"
     assert content["mismatch"]["missing_heat_W"]["body"]["peak"] == pytest.approx(HEAT, rel=0.5)
     require_probabilities(content)

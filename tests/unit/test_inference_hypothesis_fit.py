@@ -210,6 +210,10 @@ def test_known_parameters_lie_within_their_intervals(blank, tmp_path):
             low, high = fit.interval(name, 1.645)
             inside += low < value < high
             assert high / low < 1.3, name
+            # What is stated is wider by what an inexact model adds, and no wider than what was known.
+            stated = np.log(fit.stated_interval(name, 1.645))
+            assert 1.3 < (stated[1] - stated[0]) / np.log(high / low) < 1.01 * INTERVAL_WIDENING, name
+        assert (fit.stated_sigmas[: len(belief.mean)] <= 1.0 + 1e-9).all()
         assert fit.reduced_misfit == pytest.approx(1.0, abs=0.15)
     assert chi2.sf(sum(squares), 5 * len(TRUTH)) > 1e-3
     assert 17 <= inside <= 25

@@ -7,7 +7,7 @@ import pytest
 
 from spindle_fem.commands.console import print_diagnosis
 from spindle_fem.inference.next_measurement import lead_words
-from spindle_fem.report.diagnosis_tables import cards, channel_table, fit_table, set_tables
+from spindle_fem.report.diagnosis_tables import cards, channel_table, fit_table, next_blocks, set_tables
 from spindle_fem.report.diagnosis_words import checks, confidence_words, verdict_sentence
 
 STATEMENT = "312 W of heat enters the housing."
@@ -99,6 +99,38 @@ def test_a_p_value_that_says_nothing_beside_what_is_left_is_not_stated(capsys):
         assert ("(p " in capsys.readouterr().out) == stated
         assert any("nothing were missing" in item["name"] for item in cards(told).items) == stated
         assert any("nothing were missing" in words for words in confidence_words(told)) == stated
+
+
+def test_sizes_of_intervals_stand_beside_their_times():
+    told = content("missing_physics")
+    told["findings"][0]["intervals"] = [
+        {"start": 3600.0, "end": 7200.0, "value": 34.83},
+        {"start": 9000.0, "end": 9600.0, "value": 147.5},
+    ]
+    table = next(item for item in set_tables(told) if item.caption.startswith("When it is on"))
+    assert [row["cells"][-3:] for row in table.rows] == [
+        ["1.00 h", "2.00 h", "34.8 W"],
+        ["2.50 h", "2.67 h", "148 W"],
+    ]
+
+
+def test_a_difference_of_proposed_tests_is_that_of_the_second_answer_from_the_first():
+    told = content("ambiguous")
+    told["next_measurement"] |= {
+        "between": ["heat", "cooling"],
+        "options": [
+            {
+                "where": "SP01",
+                "channel": "SP01",
+                "condition": "a step",
+                "expected_information": 0.5,
+                "difference_K": -4.0,
+                "sigma_K": 0.5,
+                "after_s": 600.0,
+            }
+        ],
+    }
+    assert "what is read if it is cooling, less what if it is heat" in next_blocks(told)[-1].caption
 
 
 def test_probabilities_are_shown_beside_sets_of_long_names(capsys):

@@ -50,8 +50,10 @@ class HeatScale(Effect):
         return {"factor": Reported(values.get(candidate.amplitude, 1.0), "")}
 
     def statement(self, candidate: Candidate, reported: Mapping[str, Reported]) -> str:
-        """State the factor on the heat."""
+        """State the factor on the heat, of one source where a node has several."""
+        name = candidate.form.removeprefix(f"{candidate.component}.").replace("_", " ")
+        source = f" of {name}" if name else ""
         return (
-            f"{capital(place_words(candidate.component))}: the heat is {reported['factor'].value:.2f} "
-            "times the modelled one at every speed and temperature."
+            f"{capital(place_words(candidate.component))}: the heat{source} is "
+            f"{reported['factor'].value:.2f} times the modelled one at every speed and temperature."
         )
