@@ -27,6 +27,7 @@ from spindle_fem.inference.full_model_check import (
     require_choice,
 )
 from spindle_fem.inference.full_model_confirmation import with_confirmation
+from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.improved_machine import improved_machine
 from spindle_fem.inference.next_measurement import next_measurement
 from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine, with_growth
@@ -141,6 +142,9 @@ def _diagnose(request: _Request, reporter: BackgroundProcess | None) -> dict[str
     tell("reading")
     read = [recording_of(item, request.machine, overrides) for item in request.recordings]
     earlier = [recording_of(item, request.machine, overrides) for item in request.calibrate]
+    for recording in read:
+        # A choice that is none is refused before a fast model is made for it.
+        heldout_stamps(recording, request.heldout)
     opened = open_machine(request.machine, overrides, read, earlier, heldout=request.heldout, progress=tell)
     opened = with_growth(refined(opened))
     with output_folder(request.folder) as place:

@@ -122,7 +122,7 @@ def missing_heat(data: xr.Dataset, components: Sequence[str], number: int) -> Fi
     figure = new_figure(140.0 + 290.0 * len(tracks) + 190.0)
     shown = None
     for position, (component, track) in enumerate(tracks.items()):
-        axes = pixel_axes(figure, 110.0, 130.0 + 290.0 * position, 1440.0, 210.0, sharex=shown)
+        axes = pixel_axes(figure, 140.0, 130.0 + 290.0 * position, 1410.0, 210.0, sharex=shown)
         shown = shown or axes
         item = data.isel(track=track)
         times = item["heat_time"].values
@@ -141,11 +141,12 @@ def missing_heat(data: xr.Dataset, components: Sequence[str], number: int) -> Fi
         axes.stairs(heat, edges, color=CYCLE[0], linewidth=1.8, baseline=None)
         axes.set_ylabel("heat / W")
         spot = str(item["track_spot"].values)
-        detail = "" if spot == component else f" (at {spot.replace('_', ' ')})"
+        own_place = spot in (component, f"near.{component}")
+        detail = "" if own_place else f" (at {spot.replace('_', ' ')})"
         axes.set_title(component.replace("_", " ") + detail)
         axes.tick_params(labelbottom=False)
         axes.margins(x=0.01)
-    strip = pixel_axes(figure, 110.0, 130.0 + 290.0 * len(tracks), 1440.0, 100.0, sharex=shown)
+    strip = pixel_axes(figure, 140.0, 130.0 + 290.0 * len(tracks), 1410.0, 100.0, sharex=shown)
     _draw_drive(strip, own, scale)
     label_times(strip, str(data["start_stamp"].values[number]) or None, stop)
     set_title(

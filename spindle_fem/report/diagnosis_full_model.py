@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from spindle_fem.inference import tuned
 from spindle_fem.report.block_page import Notice, Section, Table, Text
 from spindle_fem.report.diagnosis_tables import recording_fields
-from spindle_fem.report.diagnosis_words import fits_told
+from spindle_fem.report.diagnosis_words import fits_told, kelvin
 from spindle_fem.report.table_rows import fixed, table_of, words
 
 # Sources of errors where there is one fit: both models.
@@ -54,6 +55,13 @@ def _words(found: Mapping[str, Any], fits: Sequence[str]) -> str:
             " On what the two fits differ by, both models agree within "
             f"{_largest(found['differences'], 'change_K'):.2g} K."
         )
+        before, after = (found[when]["heldout_rmse_K"] for when in ("before", "after"))
+        if before is not None and after is not None:
+            verb = "lowers" if after < (1.0 - tuned.LEAST_IMPROVEMENT) * before else "does not lower"
+            text += (
+                f" What was found {verb} the full model's held-out error: {kelvin(before)} before, "
+                f"{kelvin(after)} after."
+            )
     if (left := found.get("left")) and len(fits) > 1:
         text += (
             f" With that change the set leaves {left['full']:.2g} times the errors expected of the readings, "

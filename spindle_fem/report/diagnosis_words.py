@@ -8,6 +8,7 @@ from typing import Any
 from spindle_fem.effects.framework.effect import capital, place_words
 from spindle_fem.effects.registry import catalogue
 from spindle_fem.inference import tuned
+from spindle_fem.inference.coordinate_names import PROBE_PREFIX
 from spindle_fem.report.table_rows import significant
 
 # P-values below are too small for the models behind them to mean their digits.
@@ -290,10 +291,12 @@ def confidence_words(content: Mapping[str, Any]) -> list[str]:
         f"Held out, never seen by the fit: {fit['heldout']}.",
     ]
     if content.get("candidates_tried"):
+        names = [row["name"] for row in content.get("machine_parameters", [])]
+        probes = " and the places of the probes" if any(n.startswith(PROBE_PREFIX) for n in names) else ""
         found.append(
             f"{content['candidates_tried']} candidates of the catalogue were tried, "
             f"{content.get('hypotheses_fitted', 0)} sets fitted to the end with the machine's uncertain "
-            "parameters and the places of the probes."
+            f"parameters{probes}."
         )
     other = content.get("something_else_probability")
     if other is not None:
