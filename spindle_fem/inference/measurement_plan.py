@@ -199,12 +199,18 @@ def plan_measurement(
     earlier = with_misdescriptions(earlier, misdescriptions_of(earlier)) if machine.calibration else None
     calibrated = calibrate(earlier, predictor)
     candidates = candidates_for(machine.view)
-    spots = _interval_candidates(machine.view, float(np.ptp(machine.recordings[0].times)))
     places = _places(machine, predictor)
     progress("plan: basis")
     small, *_ = smaller_predictors(predictor, machine.view, candidates, [place.name for place in places])
     problem = Problem(small, calibrated.belief, calibrated.slow, small.observations)
-    variants = variants_of(candidates) + variants_of(spots)
+    laws = variants_of(candidates)
+
+    def variants_in(number: int) -> list[Variant]:
+        # Tests that are compared may be shorter than the asked one: intervals are shares of each.
+        duration = float(np.ptp(machine.recordings[number].times))
+        return laws + variants_of(_interval_candidates(machine.view, duration))
+
+    variants = variants_in(0)
     forms, hypotheticals = _forms(variants)
     progress(f"plan: {asked}")
     acting = [item for item in directions if item.recording in (None, 0)]
@@ -247,7 +253,7 @@ def plan_measurement(
     for number, schedule in enumerate(schedules, 1):
         progress(f"plan: {schedule.name}")
         try:
-            own = _products(problem, number, variants)
+            own = _products(problem, number, variants_in(number))
         except NOT_SIMULATED as error:
             failed.append((schedule.name, str(error)))
             continue

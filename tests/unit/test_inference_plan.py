@@ -7,6 +7,8 @@ import pytest
 
 from spindle_fem.commands.plan_command import plan, planned_measurement
 from spindle_fem.definition.load import load_machine
+from spindle_fem.effects.framework.effect import in_intervals
+from spindle_fem.effects.registry import effect_of
 from spindle_fem.errors import BadInputError, SpecError
 from spindle_fem.inference import measurement_plan, misdescription_columns, opened_machine
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
@@ -67,6 +69,23 @@ def test_heat_at_two_bodies_is_told_apart_once_each_is_read(machine):
     assert told_from(both, HEAT_AT_B, HEAT_AT_A) < 1.0 < told_from(one, HEAT_AT_B, HEAT_AT_A)
     assert one.plan.sensors_in_turn[0].name == "b"
     assert one.plan.sensors_in_turn[0].information == pytest.approx(both.plan.asked.information, rel=0.1)
+
+
+def test_intervals_lie_within_each_test_that_is_compared(machine, monkeypatch):
+    sizes, products = [], measurement_plan._products
+
+    def kept(problem, number, variants, *further):
+        found = products(problem, number, variants, *further)
+        own = [(i, item.candidate) for i, item in enumerate(variants) if item.key == HEAT_AT_A]
+        timed = [i for i, candidate in own if in_intervals(effect_of(candidate.effect), candidate)]
+        sizes.append(np.einsum("cii->i", found.effects)[timed])
+        return found
+
+    monkeypatch.setattr(measurement_plan, "_products", kept)
+    planned_measurement(machine(), test="heat_up:24h", inputs=["power=40 W"])
+    # The asked test of 24 h, then those of 8 h, in which heat after their end would move nothing.
+    assert np.shape(sizes) == (5, len(measurement_plan.INTERVALS))
+    assert np.min(sizes) > 100.0
 
 
 def test_offset_of_a_sensor_is_seen_from_the_size_that_noise_leaves(machine):
