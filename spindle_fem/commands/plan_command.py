@@ -38,6 +38,7 @@ from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.recordings.recordable_names import recordable_names
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.run_log import LOGGER
+from spindle_fem.solvers.network_start import require_compatible
 from spindle_fem.units import TEMPERATURE_UNIT, ZERO_CELSIUS_K, to_si
 
 Progress = Callable[[str], None]
@@ -175,6 +176,8 @@ def planned_measurement(
             raise SpecError(
                 "input", "belongs to a standard test.", "Leave it out: the recording has its own."
             )
+        if conditions.network is not None:
+            require_compatible(conditions.network, read)
         asked, chosen = _of_recording(read, sensors, conditions)
         seconds, words, full = float(np.ptp(read.times)), f'the inputs of "{read.name}"', {}
         conditions = _as_recorded(conditions, read)
@@ -217,6 +220,11 @@ def _input(text: str) -> tuple[str, tuple[float, str]]:
     return name, (to_si(value, unit, where=where, kind=kind), base_name(unit))
 
 
+def _parts(asked: Sequence[str]) -> list[tuple[str, ...]]:
+    """Name, equals sign and noise of each sensor in ``NAME=NOISE,NAME`` texts."""
+    return [tuple(word.strip() for word in part.partition("=")) for text in asked for part in text.split(",")]
+
+
 def _sensors(asked: Sequence[str], known: Mapping[str, Sensor]) -> tuple[Sensor, ...]:
     """Requested sensors, by the probe that each reads, with their noise."""
     if not known:
@@ -226,8 +234,7 @@ def _sensors(asked: Sequence[str], known: Mapping[str, Sensor]) -> tuple[Sensor,
             "Add [[probe]] tables to the definition; see docs/planning.md.",
         )
     chosen, noise = [], {}
-    for text in (part for item in asked for part in item.split(",")):
-        name, found, given = (part.strip() for part in text.partition("="))
+    for name, found, given in _parts(asked):
         if name != ALL and name not in known:
             raise SpecError(
                 "sensors", f'"{name}" is no sensor of this machine.', did_you_mean(name, (*known, ALL))
@@ -269,8 +276,8 @@ def _of_recording(
         moved = zip(read.displacement_names, read.displacement_sensors, read.displacement_sigma, strict=True)
         own |= {probe: Sensor(name, probe, float(sigma), displaced=True) for name, probe, sigma in moved}
     others = {name: item for name, item in conditions.sensors.items() if name not in own}
-    names = [item for item in asked if item.partition("=")[0].strip() != ALL]
-    chosen = _sensors(asked, own | others if names else own)
+    named = any(name != ALL for name, *_ in _parts(asked))
+    chosen = _sensors(asked, own | others if named else own)
     return with_sensors(read, chosen, conditions.start), chosen
 
 

@@ -3,13 +3,15 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from spindle_fem.commands.diagnose_command import diagnose_without_report
 from spindle_fem.commands.plan_command import plan, planned_measurement
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.framework.effect import in_intervals
 from spindle_fem.effects.registry import effect_of
-from spindle_fem.errors import BadInputError, SpecError
+from spindle_fem.errors import BadInputError, FaultsError, SpecError
 from spindle_fem.inference import measurement_plan, misdescription_columns, opened_machine
 from spindle_fem.inference.heat_misdescriptions import heat_misdescriptions
 from spindle_fem.inference.heldout import heldout_stamps
@@ -25,6 +27,7 @@ from spindle_fem.inference.told_apart import (
     misfit_told,
 )
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
+from tests.support.flawed_network import MACHINE, record
 from tests.support.lumped_spindle import lumped_model
 from tests.support.written_texts import network_text
 
@@ -247,6 +250,41 @@ def test_bad_input_is_refused_with_what_is_allowed(machine, tmp_path, options, w
         plan(machine(), tmp_path / "out", **asked)
     assert caught.value.exit_status == 2
     assert words in str(caught.value)
+
+
+@pytest.fixture
+def drive(tmp_path):
+    """A network, and what writes a recording of it without one of its columns."""
+    path = tmp_path / "drive.toml"
+    path.write_text(MACHINE, encoding="utf-8")
+
+    def recorded_without(column):
+        run = record(tmp_path / "run", 3)
+        pd.read_csv(run / "data.csv").drop(columns=column).to_csv(run / "data.csv", index=False)
+        lines = (run / "recording.toml").read_text(encoding="utf-8").splitlines()
+        kept = [line for line in lines if f'column = "{column}"' not in line]
+        (run / "recording.toml").write_text("\n".join(kept), encoding="utf-8")
+        return run
+
+    return path, recorded_without
+
+
+def test_a_recording_without_an_input_is_refused_as_a_diagnosis_refuses_it(drive, tmp_path):
+    path, recorded_without = drive
+    run = recorded_without("P")
+    with pytest.raises(FaultsError, match='no channel drives "power"') as caught:
+        planned_measurement(path, test=run)
+    with pytest.raises(FaultsError) as of_diagnosis:
+        diagnose_without_report(path, [run], tmp_path / "out")
+    assert str(caught.value) == str(of_diagnosis.value)
+
+
+def test_one_text_gives_the_noise_of_all_and_a_sensor_that_a_recording_does_not_read(drive):
+    path, recorded_without = drive
+    found = planned_measurement(
+        path, test=recorded_without("Tb"), sensors=["all=0.2K,body"], compare=False
+    ).sensors
+    assert [(item.probe, item.noise) for item in found] == [("body", 0.2)]
 
 
 def test_a_test_of_a_machine_without_a_channel_has_no_coolant() -> None:
