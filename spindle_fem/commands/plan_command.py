@@ -38,7 +38,7 @@ from spindle_fem.recordings.align import Recording, read_recording
 from spindle_fem.recordings.recordable_names import recordable_names
 from spindle_fem.results.output_folder import output_folder, replace_text
 from spindle_fem.results.run_log import LOGGER
-from spindle_fem.solvers.network_start import require_compatible
+from spindle_fem.solvers.network_start import initial_parameters, require_compatible
 from spindle_fem.units import TEMPERATURE_UNIT, ZERO_CELSIUS_K, to_si
 
 Progress = Callable[[str], None]
@@ -178,9 +178,9 @@ def planned_measurement(
             )
         if conditions.network is not None:
             require_compatible(conditions.network, read)
+        conditions = _as_recorded(conditions, read)
         asked, chosen = _of_recording(read, sensors, conditions)
         seconds, words, full = float(np.ptp(read.times)), f'the inputs of "{read.name}"', {}
-        conditions = _as_recorded(conditions, read)
     compared = min(seconds, LONGEST_COMPARED)
     schedules = conditions.family(compared) if compare else []
     recordings = [asked, *(recording_of(conditions, item, chosen) for item in schedules)]
@@ -278,7 +278,14 @@ def _of_recording(
     others = {name: item for name, item in conditions.sensors.items() if name not in own}
     named = any(name != ALL for name, *_ in _parts(asked))
     chosen = _sensors(asked, own | others if named else own)
-    return with_sensors(read, chosen, conditions.start), chosen
+    if conditions.network is None:
+        mean = float(np.mean([*read.first_readings().values()] or [conditions.start]))
+        begun = dict.fromkeys((*own, *others), mean)
+    else:
+        # Where a diagnosis lets nodes begin that nothing reads.
+        started = initial_parameters(conditions.network, read)
+        begun = {name: item.value for name, item in zip(conditions.network.node_names, started, strict=True)}
+    return with_sensors(read, chosen, begun), chosen
 
 
 def _as_recorded(conditions: Conditions, read: Recording) -> Conditions:

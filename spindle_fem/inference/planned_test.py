@@ -85,8 +85,6 @@ class Conditions:
         SI base units of the inputs.
     driven : tuple of str
         Inputs that heat the machine.
-    start : float, [K]
-        Of everything, before the test.
     assumed : tuple of str
         Inputs whose size nothing says: as large as warms the hottest node by ``USUAL_RISE``.
     """
@@ -96,8 +94,16 @@ class Conditions:
     usual: Mapping[str, float]
     units: Mapping[str, str]
     driven: tuple[str, ...]
-    start: float
     assumed: tuple[str, ...] = ()
+
+    @property
+    def start(self) -> float:
+        """Temperature of everything before a test, K: the room's, or the mean of a network's boundaries."""
+        if self.network is None:
+            return self.usual["ambient"]
+        driven = [self.usual[name] for name in self.network.boundary_input if name is not None]
+        fixed = [float(value) for value in self.network.boundary_temperature if np.isfinite(value)]
+        return float(np.mean(driven or fixed or [ROOM]))
 
     @property
     def sensors(self) -> dict[str, Sensor]:
@@ -166,7 +172,7 @@ def conditions_of(
             if unit != UNITS[name]:
                 raise SpecError(f"input {name}", f"has the unit {unit}.", f"Allowed: units of {UNITS[name]}.")
         usual = known | {name: value for name, (value, _) in given.items()}
-        return Conditions(spec, None, usual, UNITS, ("speed",), usual["ambient"])
+        return Conditions(spec, None, usual, UNITS, ("speed",))
     spec = load_network_machine(machine, overrides)
     network = build_network(spec.network)
     temperatures = [name for name in network.boundary_input if name is not None]
@@ -182,10 +188,8 @@ def conditions_of(
     silent = [name for name in network.input_names if name not in usual]
     for name in () if recorded else silent:
         usual[name], units[name] = _warming_size(spec, network, name)
-    fixed = [float(value) for value in network.boundary_temperature if np.isfinite(value)]
-    start = float(np.mean([usual[name] for name in temperatures] or fixed or [ROOM]))
     driven = tuple(name for name in network.input_names if name not in temperatures)
-    return Conditions(spec, network, usual, units, driven, start, () if recorded else tuple(silent))
+    return Conditions(spec, network, usual, units, driven, () if recorded else tuple(silent))
 
 
 def _warming_size(spec: NetworkMachineSpec, network: ThermalNetwork, name: str) -> tuple[float, str]:
@@ -267,22 +271,22 @@ def recording_of(conditions: Conditions, schedule: Schedule, sensors: Sequence[S
         covariates=np.empty((len(times), 0)),
         segments=np.array([[0, len(times)]]),
     )
-    return with_sensors(bare, sensors, conditions.start)
+    return with_sensors(bare, sensors, {item.probe: conditions.start for item in sensors})
 
 
-def with_sensors(recording: Recording, sensors: Sequence[Sensor], start: float) -> Recording:
+def with_sensors(recording: Recording, sensors: Sequence[Sensor], start: Mapping[str, float]) -> Recording:
     """A recording as read by these sensors, at the temperature of its own start, undisplaced, throughout.
 
     Parameters
     ----------
-    start : float, [K]
-        Where the recording does not read a probe.
+    start : mapping of str to float, [K]
+        Of the probes that the recording does not read.
     """
-    first = recording.first_readings() if recording.temperature_names else {}
+    first = dict(start) | (recording.first_readings() if recording.temperature_names else {})
     warm = [item for item in sensors if not item.displaced]
     moved = [item for item in sensors if item.displaced]
     size = (recording.times.size, len(warm))
-    level = np.array([first.get(item.probe, start) for item in warm])
+    level = np.array([first[item.probe] for item in warm])
 
     def noises(own: Sequence[Sensor]) -> tuple[ChannelNoise, ...]:
         return tuple(ChannelNoise(0.0, 0.0, item.noise, 0.0) for item in own)

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from spindle_fem.commands.diagnose_command import diagnose_without_report
-from spindle_fem.commands.plan_command import plan, planned_measurement
+from spindle_fem.commands.plan_command import _as_recorded, _of_recording, plan, planned_measurement
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.framework.effect import in_intervals
 from spindle_fem.effects.registry import effect_of
@@ -26,6 +26,7 @@ from spindle_fem.inference.told_apart import (
     misfit_seen,
     misfit_told,
 )
+from spindle_fem.machine.view.defined_point import defined_recording
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from tests.support.flawed_network import MACHINE, record
 from tests.support.lumped_spindle import lumped_model
@@ -258,9 +259,11 @@ def drive(tmp_path):
     path = tmp_path / "drive.toml"
     path.write_text(MACHINE, encoding="utf-8")
 
-    def recorded_without(column):
-        run = record(tmp_path / "run", 3)
-        pd.read_csv(run / "data.csv").drop(columns=column).to_csv(run / "data.csv", index=False)
+    def recorded_without(column, warmer=0.0, times=None):
+        run = record(tmp_path / "run", 3, times=times)
+        columns = pd.read_csv(run / "data.csv")
+        columns[["Tw", "Tl", "Tb", "room"]] += warmer
+        columns.drop(columns=column).to_csv(run / "data.csv", index=False)
         lines = (run / "recording.toml").read_text(encoding="utf-8").splitlines()
         kept = [line for line in lines if f'column = "{column}"' not in line]
         (run / "recording.toml").write_text("\n".join(kept), encoding="utf-8")
@@ -285,6 +288,38 @@ def test_one_text_gives_the_noise_of_all_and_a_sensor_that_a_recording_does_not_
         path, test=recorded_without("Tb"), sensors=["all=0.2K,body"], compare=False
     ).sensors
     assert [(item.probe, item.noise) for item in found] == [("body", 0.2)]
+
+
+def test_tests_beside_a_recording_begin_at_the_temperature_of_its_room(drive):
+    path, recorded_without = drive
+    found = planned_measurement(path, test=recorded_without("Tb", warmer=15.0))
+    asked, *others = found.plan.machine.recordings
+    room = asked.input_at("ambient", asked.times).mean()
+    assert room > 306.0
+    for item in others:
+        assert item.temperature[0] == pytest.approx(room, abs=1e-6)
+
+
+def test_a_sensor_that_a_recording_does_not_read_leaves_what_the_others_would_read(drive):
+    path, recorded_without = drive
+    # From amid a run, when the body is cooler than what is read.
+    run = recorded_without("Tb", warmer=15.0, times=np.arange(4440.0, 14401.0, 60.0))
+    few, more = (
+        planned_measurement(path, test=run, sensors=sensors, compare=False).plan.machine.recordings[0]
+        for sensors in (["winding,bearing"], ["winding,bearing,body"])
+    )
+    assert more.probes[2] == "body"
+    assert few.temperature[0].min() - more.temperature[0, 2] > 1.0
+    np.testing.assert_allclose(more.temperature[:, :2], few.temperature, atol=1e-3)
+
+
+def test_unread_probes_of_a_spindle_begin_with_those_that_a_recording_reads():
+    units = {"ambient": "kelvin"}
+    read = defined_recording("warm", ("SP01",), 313.15, {"ambient": (309.0, 309.0)}, units)
+    conditions = _as_recorded(conditions_of("recorded_spindle", (), {}, recorded=True), read)
+    asked, _ = _of_recording(read, ["SP01,SP05"], conditions)
+    assert asked.first_readings() == {"SP01": 313.15, "SP05": 313.15}
+    assert conditions.start == 309.0
 
 
 def test_a_test_of_a_machine_without_a_channel_has_no_coolant() -> None:
