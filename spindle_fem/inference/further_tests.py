@@ -143,10 +143,12 @@ def answer(
         The hypothesis runs away in this operation.
     """
     own = TrialPredictor(predictor, trial.drive)
+    # What was found in one recording, whichever it was, comes and goes in a trial as it did there.
+    candidates = tuple(replace(item, recording=None) for item in fit.candidates)
     chosen = [(c, i) for i, c in enumerate(fit.coordinates) if not c.name.startswith(OF_ONE_RECORDING)]
     names = [c.name for c, _ in chosen]
     values = {name: value for name, value in fit.values.items() if not name.startswith(OF_ONE_RECORDING)}
-    predicted = own.predict(0, values, fit.candidates, names)
+    predicted = own.predict(0, values, candidates, names)
     readings, slopes = [predicted.temperature], [predicted.sensitivity]
     if places:
         means = np.array([_weights(predictor, place) for place in places])
@@ -156,7 +158,7 @@ def answer(
     if directions:
         changes = [] if known is None else known
         if not changes:
-            changes += direction_columns(BaseRun(own, 0, values, fit.candidates), directions)
+            changes += direction_columns(BaseRun(own, 0, values, candidates), directions)
             if places:
                 changes[1] = means @ changes[1]
         amounts = np.array([values[item.coordinate] for item in directions])
