@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.term import COVARIATE
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import NO_VALUES, OF_ONE_RECORDING
@@ -290,16 +291,16 @@ def _geometry_trials(predictor: Predictor, view: MachineView) -> list[Trial]:
 
 
 def _usual(predictor: Predictor) -> dict[str, float]:
-    """Mean of every input over all recordings, by name; of what is positive where that is the usual state."""
-    names = predictor.drives[0].names
+    """Mean over all recordings by name; while they are on of a network's inputs and of the standard ones."""
     found = {}
-    for position, name in enumerate(names):
+    for name in predictor.drives[0].names:
         values = np.concatenate(
             [drive.start[:, drive.column(name)] for drive in predictor.drives if name in drive.names]
         )
         lengths = np.concatenate([drive.steps for drive in predictor.drives if name in drive.names])
+        drives_it = not name.startswith(COVARIATE) if predictor.is_network else name in STANDARD
         on = values > 0.0
-        chosen = on if position < len(STANDARD) and on.any() else np.ones(len(values), dtype=bool)
+        chosen = on if drives_it and on.any() else np.ones(len(values), dtype=bool)
         found[name] = float(np.average(values[chosen], weights=lengths[chosen]))
     return found
 

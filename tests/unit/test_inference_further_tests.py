@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from spindle_fem.effects.registry import effect_of
@@ -12,6 +13,7 @@ from spindle_fem.inference.opened_machine import open_machine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.recordings.align import read_recording
 from tests.support.flawed_network import MACHINE, record
+from tests.support.written_texts import manifest_text, network_text
 
 
 @pytest.fixture(scope="module")
@@ -37,3 +39,29 @@ def test_heat_of_any_recording_acts_in_every_trial(machine):
         first, second = (readings(trial, replace(heat, recording=number)) for number in (0, 1))
         np.testing.assert_array_equal(second, first)
         assert np.max(second - readings(trial)) > 5.0
+
+
+def test_every_input_of_a_network_is_usual_as_it_is_while_on(tmp_path):
+    loads = {"speed": "0.1 W/(rad/s)", "power": "1 W/W", "electrical_power": "1 W/W", "thrust": "1 W/N"}
+    text = network_text(
+        "loads",
+        {"body": "1500 J/K"},
+        {"body|ambient": "2 W/K", "body|oil": "1 W/K"},
+        [("body", *item) for item in loads.items()],
+        {"ambient": "ambient", "oil": "coolant_inlet"},
+    )
+    (tmp_path / "machine.toml").write_text(text, encoding="utf-8")
+    inputs = ["ambient", "coolant_inlet", *loads]
+    text = manifest_text("loads", {"T": "body"}, {name: name for name in inputs})
+    (tmp_path / "recording.toml").write_text(text, encoding="utf-8")
+    times = np.arange(0.0, 7201.0, 60.0)
+    columns = {"time_s": times, "T": 20.0 + 0.1 * np.cos(times), "ambient": 20.0, "coolant_inlet": 22.0}
+    columns |= dict.fromkeys(loads, np.where(times % 1800.0 < 900.0, 30.0, 0.0))
+    pd.DataFrame(columns).to_csv(tmp_path / "data.csv", index=False)
+    opened = open_machine(tmp_path / "machine.toml", (), [read_recording(tmp_path)], [])
+    trials = trials_of(Predictor(opened.fast, opened.recordings), opened.view)[1:]
+    assert [trial.quantity for trial in trials] == [name.replace("_", " ") for name in loads]
+    for trial in trials:
+        others = [name for name in loads if name != "speed" and name.replace("_", " ") != trial.quantity]
+        held = trial.drive.start[:, [trial.drive.column(name) for name in others]]
+        np.testing.assert_allclose(held, 30.0)
