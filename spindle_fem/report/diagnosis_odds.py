@@ -196,4 +196,4 @@ def _amount(item: xr.Dataset) -> str:
     if unit == "m":
         told, unit = [1e3 * value for value in told], "mm"
     middle, low, high = with_interval(*told)
-    return f"{middle} {unit} [{low}, {high}]"
+    return f"{middle} {unit}".rstrip() + f" [{low}, {high}]"
