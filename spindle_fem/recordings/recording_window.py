@@ -34,6 +34,8 @@ class RecordingWindow:
         Names the file in messages.
     tell : callable
         Called with messages on rows that are left out.
+    warm_up : float, [s]
+        While nothing was used, no row is dropped that is no older than this before the last one.
 
     Attributes
     ----------
@@ -43,8 +45,10 @@ class RecordingWindow:
         Rows left out: stamped before what was used already; not of numbers.
     """
 
-    def __init__(self, manifest: Manifest, data: Path, tell: Callable[[str], None]) -> None:
-        self.manifest, self.data, self._tell = manifest, data, tell
+    def __init__(
+        self, manifest: Manifest, data: Path, tell: Callable[[str], None], warm_up: float = 0.0
+    ) -> None:
+        self.manifest, self.data, self._tell, self._warm_up = manifest, data, tell, warm_up
         self.used, self.late, self.unreadable = -np.inf, 0, 0
         self._names: list[str] = []
         self._separator, self._header = ",", b""
@@ -83,7 +87,16 @@ class RecordingWindow:
             else:
                 found.append(row)
         if found:
-            self._rows = np.vstack((self._rows, found))[-(CONTEXT + MOST_WAITING) :]
+            # Older rows only, however many come at once: these have not been looked at yet.
+            self._rows = np.vstack((self._rows[self._droppable() :], found))
+
+    def _droppable(self) -> int:
+        """How many of the first rows are too many while they wait to be used."""
+        too_many = max(0, len(self._rows) - CONTEXT - MOST_WAITING)
+        if too_many and not np.isfinite(self.used):
+            times = self._rows[:, 0]
+            return min(too_many, int(np.argmax(times >= times.max() - self._warm_up)))
+        return too_many
 
     def _begin(self, line: bytes) -> None:
         try:

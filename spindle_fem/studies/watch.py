@@ -142,7 +142,7 @@ def watch_recording(
             "is a network, whose noise is not known before a recording.",
             'Give --calibrate RECORDING, or --warm-up "8 h": the beginning of this one, taken as sound.',
         )
-    window = RecordingWindow(manifest, data, progress)
+    window = RecordingWindow(manifest, data, progress, how.warm_up)
     lines = follow_lines(data, to_end=how.until_end, poll=how.poll, tell=progress)
     watched, teller = None, _Teller(how)
     for fresh in lines:

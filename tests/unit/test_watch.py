@@ -23,6 +23,7 @@ from spindle_fem.inference.prepared_problem import calibrate, machine_coordinate
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.inference.watched_machine import MOST_AMID, WatchedMachine, _past_changes, white_noise
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
+from spindle_fem.recordings import growing_file, recording_window
 from spindle_fem.recordings.align import read_recording
 from spindle_fem.recordings.growing_file import follow_lines
 from spindle_fem.recordings.manifest import load_manifest
@@ -176,6 +177,29 @@ def test_a_window_keeps_the_last_rows_and_leaves_out_what_is_no_row(folder):
     assert recording.times[-1] == 30.0 * 500
 
 
+def test_a_window_keeps_a_warm_up_of_more_rows_than_may_wait(folder, monkeypatch):
+    monkeypatch.setattr(recording_window, "MOST_WAITING", 100)
+    manifest, data = load_manifest(folder / "sound")
+    rows = [b"%d,20,60,20" % (30 * k) for k in range(2000)]
+    # Rows of a block of the file come at once, those of a live recording one by one.
+    for size, kept in ((1, 1002), (900, 1800)):
+        window = RecordingWindow(manifest, data, lambda text: None, warm_up=30.0 * 1000)
+        window.add([b"time,block,power,room"])
+        for begin in range(0, kept, size):
+            assert not watch._may_begin(window, 30.0 * 1000)
+            window.add(rows[begin : begin + size])
+        assert watch._may_begin(window, 30.0 * 1000)
+        assert window.recording().times.tolist() == (30.0 * np.arange(kept)).tolist()
+        # Where no channel has a reading for ever, what is older than the warm-up goes; used rows go as ever.
+        window.add(rows[kept:])
+        window.add([b"60000,20,60,20"])
+        assert window.waiting[0] == 30.0 * 999
+        window.use(30.0 * 1999)
+        window.add([b"%d,20,60,20" % (60000 + 30 * k) for k in range(1, 500)])
+        window.add([b"80000,20,60,20"])
+        assert window.recording().times.size == recording_window.CONTEXT + 100 + 1
+
+
 def test_a_window_begins_with_the_last_reading_of_an_input(folder):
     manifest, data = load_manifest(folder / "sound")
     window = RecordingWindow(manifest, data, lambda text: None)
@@ -291,6 +315,18 @@ def test_rows_that_come_one_by_one_say_what_the_whole_file_says(folder):
     )
     assert abs(first - second) < 300.0
     assert abs(len(whole) - len(found)) < 6
+
+
+def test_a_watch_begins_with_all_rows_of_its_warm_up(folder, monkeypatch):
+    def begun(machine, how, first, *others):
+        raise RecordingError("begun", f"from {first.times[0]:g} s")
+
+    monkeypatch.setattr(watch, "_begin", begun)
+    monkeypatch.setattr(recording_window, "MOST_WAITING", 10)
+    monkeypatch.setattr(growing_file, "BLOCK", 1000)
+    how = Watching(warm_up=4.0 * 3600.0, until_end=True)
+    with pytest.raises(RecordingError, match="from 0 s"):
+        list(watch_recording(folder / "machine.toml", folder / "leaves", how))
 
 
 @pytest.mark.parametrize(
