@@ -95,12 +95,20 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
 
     Parameters keep their remaining uncertainty. Directions of misdescription that correspond to a key of the
     definition are corrected; what no key corresponds to, and the position of a probe in its hole, is left as
-    defined, and the parameters are fitted once more without it.
+    defined, and the parameters are fitted once more without it. A finding that belongs to one of several
+    recordings, whose intervals count from its first row, is left out, which the log says.
     """
     predictor, fit = _as_written(diagnosis, machine)
     values = fit.values
     told = {name: state.candidate for name, state in diagnosis.states.items()}
     candidates = [told.get(item.amplitude, item) for item in fit.candidates]
+    if len(predictor.recordings) > 1:
+        # An entry of a definition acts in whatever is simulated.
+        for item in candidates:
+            if item.recording is not None:
+                name = predictor.recordings[item.recording].name
+                LOGGER.warning("improved_machine.toml lacks %s, which acts in %s only", item.label, name)
+        candidates = [item for item in candidates if item.recording is None]
     entries = tuple(
         EffectEntry.model_validate(definition_entry(item, candidate_values(item, values)))
         for item in candidates

@@ -1,5 +1,6 @@
 """The improved machine, written and read back: it predicts what the fit did."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -160,6 +161,35 @@ def test_a_size_whose_place_is_unsure_has_a_wider_interval(found, monkeypatch):
     assert shifted["value"] == narrow["value"]
     assert shifted["low"] < 0.0
     assert shifted["high"] - shifted["low"] == pytest.approx(2.0 * 1.645 * size, rel=0.2)
+
+
+def test_heat_of_one_of_two_recordings_is_not_written_for_both(opened, tmp_path, caplog):
+    heat = replace(candidate_of(opened, "unrecorded_heat_source"), recording=1)
+    both = Predictor(opened.fast, [opened.recordings[0]] * 2)
+    own = {heat.amplitude: heat.reference}
+    true = predictions_at_stamps(both, SimpleNamespace(values=own, candidates=(heat,)))
+    recordings = []
+    for name, read in zip(("cold", "hot"), true, strict=True):
+        (tmp_path / name).mkdir()
+        recordings.append(replace(written(tmp_path / name, read), name=name))
+    predictor = Predictor(opened.fast, recordings)
+    calibrated = calibrate(None, predictor)
+    problem = Problem(predictor, calibrated.belief, expected_slow_error(predictor), predictor.observations)
+    outcome = SimpleNamespace(
+        stated_fit=problem.fit((heat,), own),
+        states={},
+        predictor=predictor,
+        machine_coordinates=calibrated.belief.coordinates,
+    )
+    path = tmp_path / "improved.toml"
+    path.write_text(improved_machine(outcome, opened))
+    assert "lacks unrecorded_heat_source @ body, which acts in hot only" in caplog.text
+    again = open_machine(path, (), recordings, ())
+    told = predictions_at_stamps(
+        predictor_of(again, recordings[0]), SimpleNamespace(values={}, candidates=())
+    )
+    assert told[0] == pytest.approx(true[0], abs=0.05)
+    assert np.abs(true[1] - true[0]).max() > 1.0
 
 
 # ------------------------------------------------------------------------ sufficiency
