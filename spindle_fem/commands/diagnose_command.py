@@ -188,7 +188,9 @@ def _diagnose(request: _Request, reporter: BackgroundProcess | None) -> dict[str
             )
             content = with_confirmation(content)
             content["next_measurement"] = proposed()
-            replace_text(place / "improved_machine.toml", improved())
+            made = improved()
+            replace_text(place / "improved_machine.toml", made.text)
+            content["fit"]["improved_machine"] = dict(made.errors)
             if reporter is not None:
                 drawn()
         content["wall_time_s"] = time.perf_counter() - started

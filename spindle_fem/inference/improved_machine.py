@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from spindle_fem.inference.coordinate_names import (
     PROBE_PREFIX,
 )
 from spindle_fem.inference.diagnosis import Diagnosis
-from spindle_fem.inference.findings import candidate_values
+from spindle_fem.inference.findings import candidate_values, predictions_at_stamps, rmse
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
@@ -90,8 +91,25 @@ def _as_written(diagnosis: Diagnosis, machine: DiagnosedMachine) -> tuple[Predic
     return predictor, fit
 
 
-def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
-    """Text of the definition with the fitted parameters and an ``[[effect]]`` for each finding.
+@dataclass(frozen=True, slots=True)
+class ImprovedMachine:
+    """A definition with what was found, and how far it is from the readings.
+
+    Attributes
+    ----------
+    text : str
+        TOML.
+    errors : mapping of str to float, [K]
+        ``train_rmse_K`` and ``heldout_rmse_K`` of what it holds, without what is of a recording or a sensor
+        alone; empty where it lacks something that was found.
+    """
+
+    text: str
+    errors: Mapping[str, float]
+
+
+def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> ImprovedMachine:
+    """The definition with the fitted parameters and an ``[[effect]]`` for each finding.
 
     Parameters keep their remaining uncertainty. Directions of misdescription that correspond to a key of the
     definition are corrected; what no key corresponds to, and the position of a probe in its hole, is left as
@@ -102,12 +120,14 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
     values = fit.values
     told = {name: state.candidate for name, state in diagnosis.states.items()}
     candidates = [told.get(item.amplitude, item) for item in fit.candidates]
+    errors = _errors(predictor, fit)
     if len(predictor.recordings) > 1:
         # An entry of a definition acts in whatever is simulated.
         for item in candidates:
             if item.recording is not None:
                 name = predictor.recordings[item.recording].name
                 LOGGER.warning("improved_machine.toml lacks %s, which acts in %s only", item.label, name)
+                errors = {}
         candidates = [item for item in candidates if item.recording is None]
     entries = tuple(
         EffectEntry.model_validate(definition_entry(item, candidate_values(item, values)))
@@ -123,13 +143,25 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> str:
         for item in predictor.misdescribed:
             if hasattr(item.change, "corrected"):
                 spec = item.change.corrected(spec, values[item.coordinate])
-        return write_machine(spec.model_copy(update={"effects": (*machine.spec.effects, *entries)}))
+        spec = spec.model_copy(update={"effects": (*machine.spec.effects, *entries)})
+        return ImprovedMachine(write_machine(spec), errors)
     moved = {}
     for name, (factor, _) in own.items():
         index = next(i for i, c in enumerate(fit.coordinates) if c.name == name)
         sigma = fit.coordinates[index].sigma * float(np.sqrt(fit.covariance[index, index]))
         moved[name] = Uncertain(value_in_definition(machine.spec, machine.fast.network, name, factor), sigma)
     spec = network_spec.with_parameters(machine.spec, moved)
-    return network_spec.write_network_machine(
-        spec.model_copy(update={"effects": (*machine.spec.effects, *entries)})
-    )
+    spec = spec.model_copy(update={"effects": (*machine.spec.effects, *entries)})
+    return ImprovedMachine(network_spec.write_network_machine(spec), errors)
+
+
+def _errors(predictor: Predictor, fit: Fit) -> dict[str, float]:
+    """Errors of what a definition can hold of a fit, K."""
+    held = {item.coordinate for item in predictor.misdescribed if hasattr(item.change, "corrected")}
+    rows = [i for i, c in enumerate(fit.coordinates) if c.name in held or not c.name.startswith(FIRST_ORDER)]
+    written = replace(fit, coordinates=tuple(fit.coordinates[i] for i in rows), position=fit.position[rows])
+    predicted = predictions_at_stamps(predictor, written)
+    return {
+        "train_rmse_K": rmse(predictor, predicted, heldout=False),
+        "heldout_rmse_K": rmse(predictor, predicted, heldout=True),
+    }

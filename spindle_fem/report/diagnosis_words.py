@@ -250,6 +250,9 @@ def fit_rows(fit: Mapping[str, Any]) -> list[dict[str, Any]]:
     _, after, told = heldout_errors(fit)
     if told:
         rows.append({"model": f"{names['after']}, {told}", "fitted": None, "heldout": after})
+    if errors := fit.get("improved_machine"):
+        own = {"fitted": errors["train_rmse_K"], "heldout": errors["heldout_rmse_K"]}
+        rows.append({"model": "improved_machine.toml", **own})
     return rows
 
 

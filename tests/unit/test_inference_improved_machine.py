@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from spindle_fem.effects.registry import candidates_for, effect_of, interval_effects
-from spindle_fem.inference.findings import predictions_at_stamps, reported_parameters
+from spindle_fem.inference.findings import predictions_at_stamps, reported_parameters, rmse
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.improved_machine import improved_machine
 from spindle_fem.inference.opened_machine import open_machine
@@ -96,7 +96,8 @@ def found(request, opened, tmp_path_factory):
 def test_the_written_machine_predicts_what_the_fit_did(found, opened):
     outcome, folder = found
     path = folder / "improved.toml"
-    path.write_text(improved_machine(outcome, opened))
+    made = improved_machine(outcome, opened)
+    path.write_text(made.text)
     again = open_machine(path, (), outcome.predictor.recordings, ())
     assert len(again.effects.factors) + len(again.effects.terms) + len(again.effects.readings) == 1
     nothing = SimpleNamespace(values={}, candidates=())
@@ -105,12 +106,14 @@ def test_the_written_machine_predicts_what_the_fit_did(found, opened):
     told = predictions_at_stamps(predictor_of(again), nothing)[0]
     assert np.abs(plain - expected).max() > 0.3
     assert told == pytest.approx(expected, abs=2e-3)
+    own = rmse(predictor_of(again), [told], heldout=False)
+    assert made.errors["train_rmse_K"] == pytest.approx(own, abs=2e-3)
 
 
 def test_what_is_switched_on_is_not_found_again(found, opened):
     outcome, folder = found
     path = folder / "again.toml"
-    path.write_text(improved_machine(outcome, opened))
+    path.write_text(improved_machine(outcome, opened).text)
     again = open_machine(path, (), outcome.predictor.recordings, ())
     (candidate,) = outcome.final.candidates
     offered = {(c.effect, c.component, c.form) for c in candidates_for(again.view)}
@@ -120,7 +123,7 @@ def test_what_is_switched_on_is_not_found_again(found, opened):
 def test_parameters_keep_what_is_left_of_their_uncertainty(found, opened):
     outcome, folder = found
     path = folder / "kept.toml"
-    path.write_text(improved_machine(outcome, opened))
+    path.write_text(improved_machine(outcome, opened).text)
     again = open_machine(path, (), outcome.predictor.recordings, ())
     before = {prior.name: prior.sigma_log for prior in predictor_of(opened).uncertain()}
     after = {prior.name: prior.sigma_log for prior in predictor_of(again).uncertain()}
@@ -182,7 +185,9 @@ def test_heat_of_one_of_two_recordings_is_not_written_for_both(opened, tmp_path,
         machine_coordinates=calibrated.belief.coordinates,
     )
     path = tmp_path / "improved.toml"
-    path.write_text(improved_machine(outcome, opened))
+    made = improved_machine(outcome, opened)
+    path.write_text(made.text)
+    assert made.errors == {}
     assert "lacks unrecorded_heat_source @ body, which acts in hot only" in caplog.text
     again = open_machine(path, (), recordings, ())
     told = predictions_at_stamps(

@@ -169,7 +169,7 @@ def test_the_improved_machine_takes_up_what_its_definition_cannot_hold(case, pre
         machine_coordinates=calibrated.belief.coordinates,
     )
     path = tmp_path / "improved.toml"
-    path.write_text(improved_machine(diagnosis, SimpleNamespace(is_network=False, spec=case.spec)))
+    path.write_text(improved_machine(diagnosis, SimpleNamespace(is_network=False, spec=case.spec)).text)
     spec = load_machine(path)
     again = Predictor(fast_spindle(lumped_model(spec), spec), recorded.recordings).predict(0, {}).temperature
     plain = predictor.predict(0, {}).temperature

@@ -101,6 +101,12 @@ def test_a_p_value_that_says_nothing_beside_what_is_left_is_not_stated(capsys):
         assert any("nothing were missing" in words for words in confidence_words(told)) == stated
 
 
+def test_the_improved_machine_stands_in_the_table_with_its_own_error():
+    told = content("missing_physics")
+    told["fit"]["improved_machine"] = {"train_rmse_K": 0.983, "heldout_rmse_K": None}
+    assert fit_table(told).rows[-1]["cells"] == ["improved_machine.toml", "0.983", "–"]
+
+
 def test_sizes_of_intervals_stand_beside_their_times():
     told = content("missing_physics")
     told["findings"][0]["intervals"] = [
