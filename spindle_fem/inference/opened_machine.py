@@ -62,6 +62,8 @@ class DiagnosedMachine:
         Of the recordings, then the calibration: :func:`spindle_fem.inference.input_sampling.unseen_power`.
     too_coarse : object or None
         :class:`spindle_fem.inference.coarse_machine.TooCoarse`, where the machine's own calibration says so.
+    heldout : str
+        What the view was made without, as :func:`spindle_fem.inference.heldout.heldout_stamps` takes it.
     """
 
     name: str
@@ -75,6 +77,7 @@ class DiagnosedMachine:
     unseen: tuple[np.ndarray, ...] = ()
     rows: tuple[Recording, ...] = ()
     too_coarse: Any = None
+    heldout: str = "blocks"
 
     @property
     def is_network(self) -> bool:
@@ -135,6 +138,7 @@ def open_machine(
         tuple(recordings),
         tuple(calibration),
         (*notes, *more),
+        heldout=heldout,
     )
 
 
@@ -185,6 +189,7 @@ def _open_network(
         (*notes, *more, *averaged),
         tuple(unseen_power(network, item) for item in (*smooth, *smooth_earlier)),
         tuple(thinned(item, MOST_ROWS) for item in whole) if averaged else (),
+        heldout=heldout,
     )
 
 
@@ -210,7 +215,7 @@ def with_network(machine: DiagnosedMachine, spec: NetworkMachineSpec) -> Diagnos
     fast = fast_network(network, spec)
     has = frozenset(f"{entry.effect} @ {entry.component}" for entry in spec.effects)
     recordings = machine.recordings
-    view = _widest([view_of_network(network, item, has=has) for item in recordings])
+    view = _widest([view_of_network(network, _seen(item, machine.heldout), has=has) for item in recordings])
     effects = effects_on(spec.effects, fast, recordings[0])
     return replace(machine, spec=spec, fast=fast, effects=effects, view=view)
 

@@ -21,7 +21,7 @@ from spindle_fem.inference.network_misdescriptions import (
     TemperatureConductance,
     room_modes,
 )
-from spindle_fem.inference.opened_machine import open_machine
+from spindle_fem.inference.opened_machine import open_machine, with_network
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.network_inputs import fast_network
@@ -165,6 +165,16 @@ def test_a_machine_without_its_core_is_too_coarse_and_offered_one(tmp_path, blan
     assert better.too_coarse.additions[0].left_after < 1.3
     assert "plate_behind_1" in json.dumps(better.spec.model_dump(mode="json"))
     assert refined(better).too_coarse == better.too_coarse
+
+
+@pytest.mark.parametrize("heldout", ["blocks", "last:0.4"])
+def test_what_is_held_out_does_not_enter_what_is_usual_on_another_network(tmp_path, heldout):
+    (tmp_path / "rig.toml").write_text(MACHINE)
+    # Warmest where either choice holds out.
+    plate = 21.0 + 60.0 * np.exp(-(((TIMES - 8325.0) / 300.0) ** 2)) + 0.1 * np.sin(TIMES)
+    run = recorded(tmp_path / "run", plate)
+    opened = open_machine(tmp_path / "rig.toml", (), [run], [], heldout=heldout)
+    assert with_network(opened, opened.spec).view == opened.view
 
 
 def hurried(values, rate):
