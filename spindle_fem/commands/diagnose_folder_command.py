@@ -8,7 +8,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -117,6 +117,13 @@ def diagnose_folder(
     ]
     common += [_content_of(path) for path in calibration]
     keys = {name: _key(name, [*common, _content_of(path)]) for name, path in found.items()}
+    # Workers may run in another directory; a machine that ships goes by its name.
+    path = Path(order.machine)
+    sent = replace(
+        order,
+        machine=path.resolve() if path.is_file() else order.machine,
+        calibrate=[item.resolve() for item in calibration],
+    )
     with folder_lock(folder), output_folder(folder) as place:
         table = ResultTable(place, COLUMNS, TABLE)
         waiting = [
@@ -124,9 +131,7 @@ def diagnose_folder(
             for name, key in keys.items()
             if key not in table or (table.rows[key]["status"] == OK and not is_complete(place / name))
         ]
-        calls = [
-            partial(_diagnosed, order, found[name].resolve(), place.resolve() / name) for name in waiting
-        ]
+        calls = [partial(_diagnosed, sent, found[name].resolve(), place.resolve() / name) for name in waiting]
         done = len(found) - len(waiting)
         progress(f"{done} of {len(found)} recordings")
         began = time.perf_counter()

@@ -92,6 +92,26 @@ def test_what_is_done_is_not_done_again(folder, asked, tmp_path):
     assert json.loads((tmp_path / "out" / "diagnoses.json").read_text())["diagnosed"] == 2
 
 
+@pytest.mark.parametrize(("machine", "whole"), [("machine.toml", True), ("bench_motor", False)])
+def test_workers_of_another_directory_are_told_whole_paths(folder, monkeypatch, machine, whole):
+    sent = []
+
+    def diagnosed(machine, recordings, place, calibrate, overrides, **options):
+        sent.append((machine, [*recordings, place, *calibrate]))
+        with output_folder(place):
+            (place / "diagnosis.json").write_text("{}")
+        return FOUND
+
+    monkeypatch.setattr(command, "diagnose", diagnosed)
+    monkeypatch.chdir(folder)
+    # A recording may be named by its folder.
+    diagnose_folder(FolderOrder(machine, ("third", "earlier.toml")), ".", "out")
+    calibrate = [folder / "third" / "recording.toml", folder / "earlier.toml"]
+    for name, (told, paths) in zip(("first", "second"), sent, strict=True):
+        assert told == (folder / machine if whole else machine)
+        assert paths == [folder / f"{name}.toml", folder / "out" / name, *calibrate]
+
+
 def test_no_recording_and_none_that_works_are_bad_input(folder, asked, tmp_path):
     with pytest.raises(BadInputError, match="holds no recording"):
         diagnose_folder(FolderOrder("bench_motor"), folder / "answers", tmp_path / "out")
