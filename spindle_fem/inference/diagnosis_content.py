@@ -15,6 +15,7 @@ from spindle_fem.inference.findings import (
     channel_errors,
     displacement_errors,
     findings_of,
+    fitted_and_heldout_errors,
     noise_level,
     predictions_at_stamps,
     rmse,
@@ -73,8 +74,8 @@ def diagnosis_content(
             "gain_of_more": judgement.gain_of_more,
         },
         "fit": {
-            "before": _errors(diagnosis, before),
-            "after": _errors(diagnosis, after) | _by_what_is_told(diagnosis),
+            "before": fitted_and_heldout_errors(predictor, before),
+            "after": fitted_and_heldout_errors(predictor, after) | _by_what_is_told(diagnosis),
             "noise_K": noise_level(predictor),
             "heldout": diagnosis.heldout + (STATES_ARE_TOLD if diagnosis.states else ""),
             "heldout_s": [
@@ -133,13 +134,6 @@ def _reasons(opened: DiagnosedMachine, judgement: Judgement) -> tuple[str, ...]:
         f"Its calibration leaves {coarse.left_with_them:.1f} times: nothing says that the machine has "
         "changed since.",
     )
-
-
-def _errors(diagnosis: Diagnosis, predicted: Sequence[np.ndarray]) -> dict[str, float]:
-    return {
-        "train_rmse_K": rmse(diagnosis.predictor, predicted, heldout=False),
-        "heldout_rmse_K": rmse(diagnosis.predictor, predicted, heldout=True),
-    }
 
 
 def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:

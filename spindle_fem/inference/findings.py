@@ -210,6 +210,14 @@ def at_stamps(predictor: Predictor, number: int, on_grid: Array) -> Array:
     return predicted
 
 
+def fitted_and_heldout_errors(predictor: Predictor, predicted: Sequence[Array]) -> dict[str, float]:
+    """``train_rmse_K`` and ``heldout_rmse_K`` of predictions at the stamps, as :func:`rmse` has them."""
+    return {
+        "train_rmse_K": rmse(predictor, predicted, heldout=False),
+        "heldout_rmse_K": rmse(predictor, predicted, heldout=True),
+    }
+
+
 def rmse(predictor: Predictor, predicted: Sequence[Array], *, heldout: bool) -> float:
     """Root mean square error over all temperatures of all recordings, K; NaN without readings."""
     total, number = 0.0, 0

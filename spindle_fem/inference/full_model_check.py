@@ -25,8 +25,8 @@ from spindle_fem.inference.findings import (
     channel_errors,
     channel_noise,
     displacement_errors,
+    fitted_and_heldout_errors,
     predictions_at_stamps,
-    rmse,
 )
 from spindle_fem.inference.full_model_confirmation import left_by_both
 from spindle_fem.inference.full_model_runs import (
@@ -287,8 +287,7 @@ def _both_fits(
         predictor, fit = fits[name]
         keep(name, full.predicted)
         found[name] = {
-            "train_rmse_K": rmse(predictor, full.predicted, heldout=False),
-            "heldout_rmse_K": rmse(predictor, full.predicted, heldout=True),
+            **fitted_and_heldout_errors(predictor, full.predicted),
             "channels": channel_errors(predictor, full.predicted),
             "displacements": displacement_errors(predictor, full.predicted),
             "steps": full.steps,

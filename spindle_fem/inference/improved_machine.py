@@ -22,7 +22,11 @@ from spindle_fem.inference.coordinate_names import (
     PROBE_PREFIX,
 )
 from spindle_fem.inference.diagnosis import Diagnosis
-from spindle_fem.inference.findings import candidate_values, predictions_at_stamps, rmse
+from spindle_fem.inference.findings import (
+    candidate_values,
+    fitted_and_heldout_errors,
+    predictions_at_stamps,
+)
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
@@ -160,8 +164,4 @@ def _errors(predictor: Predictor, fit: Fit) -> dict[str, float]:
     held = {item.coordinate for item in predictor.misdescribed if hasattr(item.change, "corrected")}
     rows = [i for i, c in enumerate(fit.coordinates) if c.name in held or not c.name.startswith(FIRST_ORDER)]
     written = replace(fit, coordinates=tuple(fit.coordinates[i] for i in rows), position=fit.position[rows])
-    predicted = predictions_at_stamps(predictor, written)
-    return {
-        "train_rmse_K": rmse(predictor, predicted, heldout=False),
-        "heldout_rmse_K": rmse(predictor, predicted, heldout=True),
-    }
+    return fitted_and_heldout_errors(predictor, predictions_at_stamps(predictor, written))
