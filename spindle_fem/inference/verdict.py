@@ -293,15 +293,16 @@ def _named(sets: _Weighed, asked: _Asked) -> Judgement:
         )
         and item.fit.candidates
     )
-    # What a coarse machine gives up although it is likely shares what is left.
-    other = max(0.0, 1.0 - known - nothing)
+    # What a coarse machine gives up although it is likely shares what the others are doubted by; what they
+    # leave unexplained is something else.
+    doubted_by = max(0.0, exact - known)
     given_up = [i for i in sets.before if i.fit.named_keys not in sets.by_all and i.fit.candidates]
     doubtful = tuple(
-        Ranked(i.best, other * i.probability)
+        Ranked(i.best, doubted_by * i.probability)
         for i in given_up
-        if other * i.probability >= tuned.LISTED or any(i.best is one.best for one in listed)
+        if doubted_by * i.probability >= tuned.LISTED or any(i.best is one.best for one in listed)
     )
-    other = max(0.0, other - sum(item.probability for item in doubtful))
+    other = max(0.0, 1.0 - known - nothing - sum(item.probability for item in doubtful))
     alternatives += doubtful
     if nothing >= tuned.LISTED:
         alternatives += (Ranked(sets.empty.best, nothing),)
