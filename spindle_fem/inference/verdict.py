@@ -246,11 +246,17 @@ def _not_named(sets: _Weighed, asked: _Asked) -> Judgement:
         _, others = as_one([empty, *(i for i in kept if i.fit.candidates)], asked.overlapping)
         # What chance or the prior holds is as likely as not, whatever evidence says; sets share the rest.
         nothing = max(empty.probability, tuned.STILL_POSSIBLE)
+        doubtful = asked.coarseness == 1.0 and sets.p_value < tuned.DOUBTFUL
+        if doubtful:
+            # Chance leaves as much in few recordings: no surer, though no set tells held-out readings.
+            nothing = tuned.STILL_POSSIBLE
         rest = sum(i.probability for i in others)
         share = min(1.0, (1.0 - nothing) / max(rest, np.finfo(float).tiny))
         rivals = (replace(i, probability=share * i.probability) for i in others)
         listed = tuple(i for i in rivals if i.probability >= tuned.LISTED)
-        return Judgement("consistent", sets.p_value, replace(empty, probability=nothing), listed, 0.0, "")
+        told = replace(empty, probability=nothing)
+        other = max(0.0, 1.0 - nothing - share * rest) if doubtful else 0.0
+        return Judgement("consistent", sets.p_value, told, listed, other, "")
     # The residual is there, and no set of the catalogue makes it likelier.
     p_value, reason = sets.p_value, CONTRADICTED_REASON
     if much_left:

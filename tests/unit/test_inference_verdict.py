@@ -151,6 +151,19 @@ def test_what_chance_leaves_is_consistent_with_a_half_at_least_and_likelier_sets
     assert other.probability == pytest.approx(1.0 - tuned.STILL_POSSIBLE)
 
 
+def test_consistent_recording_that_chance_hardly_makes_is_no_surer_than_as_likely_as_not():
+    nothing, dear = hypothesis(misfit=420.0), hypothesis(PRELOAD, misfit=400.0, evidence=-260.0)
+    told = {trials: verdict(nothing, dear, trials=trials) for trials in (200, 2000)}
+    assert tuned.SIGNIFICANT < told[200].p_value < tuned.DOUBTFUL < told[2000].p_value
+    assert {item.verdict for item in told.values()} == {"consistent"}
+    assert told[200].chosen.probability == tuned.STILL_POSSIBLE
+    assert told[2000].chosen.probability > 0.99
+    sums = [
+        t.chosen.probability + t.other + sum(a.probability for a in t.alternatives) for t in told.values()
+    ]
+    assert sums == pytest.approx([1.0, 1.0])
+
+
 def test_complexity_alone_does_not_make_an_impossible_recording_consistent():
     dear, none = candidate("grease_churning"), hypothesis(misfit=460.0, log_prior=-0.5)
     # The dear set pays more for its parameters than it gains, tempered: probably nothing, were it possible.
