@@ -231,7 +231,9 @@ def _weighed(hypotheses: Sequence[Hypothesis], trials: int, asked: _Asked) -> _W
 def _not_named(sets: _Weighed, asked: _Asked) -> Judgement:
     """No set is named: the recording is consistent, or what it contradicts is not explained."""
     chosen, kept, empty = sets.ranked[0], sets.ranked, sets.empty
-    if chosen.fit.candidates and not sets.predicts(chosen, asked):
+    # Chance hardly leaves as much: nothing missing is no surer, though no set tells held-out readings.
+    doubtful = asked.coarseness == 1.0 and sets.p_value < tuned.DOUBTFUL
+    if chosen.fit.candidates and not doubtful and not sets.predicts(chosen, asked):
         # What does not tell held-out readings is given up: nothing missing has its probability.
         kept = [i for i in kept if i.fit.candidates and sets.predicts(i, asked)]
         empty = replace(empty, probability=1.0 - sum(i.probability for i in kept))
@@ -245,11 +247,7 @@ def _not_named(sets: _Weighed, asked: _Asked) -> Judgement:
     if not (much_left or (impossible and more_left)) or (left <= tuned.MOST_LEFT and in_prior):
         _, others = as_one([empty, *(i for i in kept if i.fit.candidates)], asked.overlapping)
         # What chance or the prior holds is as likely as not, whatever evidence says; sets share the rest.
-        nothing = max(empty.probability, tuned.STILL_POSSIBLE)
-        doubtful = asked.coarseness == 1.0 and sets.p_value < tuned.DOUBTFUL
-        if doubtful:
-            # Chance leaves as much in few recordings: no surer, though no set tells held-out readings.
-            nothing = tuned.STILL_POSSIBLE
+        nothing = max(0.0 if doubtful else empty.probability, tuned.STILL_POSSIBLE)
         rest = sum(i.probability for i in others)
         share = min(1.0, (1.0 - nothing) / max(rest, np.finfo(float).tiny))
         rivals = (replace(i, probability=share * i.probability) for i in others)

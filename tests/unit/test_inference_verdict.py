@@ -158,6 +158,10 @@ def test_consistent_recording_that_chance_hardly_makes_is_no_surer_than_as_likel
     assert {item.verdict for item in told.values()} == {"consistent"}
     assert told[200].chosen.probability == tuned.STILL_POSSIBLE
     assert told[2000].chosen.probability > 0.99
+    # What evidence prefers stands beside it though held-out readings do not tell it.
+    likely = verdict(nothing, hypothesis(PRELOAD, misfit=400.0), trials=200, beyond=lambda fit: 1.0)
+    assert (likely.verdict, likely.chosen.fit.candidates) == ("consistent", ())
+    assert [item.fit.candidates for item in likely.alternatives] == [(PRELOAD,)]
     sums = [
         t.chosen.probability + t.other + sum(a.probability for a in t.alternatives) for t in told.values()
     ]
