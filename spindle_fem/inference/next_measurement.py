@@ -56,7 +56,7 @@ SPACING = 300.0
 FEWEST_INSTANTS, MOST_INSTANTS = 12, 48
 # Options with this share of the best one's information are worth as much; the simplest of them is proposed.
 AS_GOOD = 0.9
-# A test with less expected information than this, bits, does not separate the explanations.
+# A test that is expected to tell less than this share of what is open does not separate the explanations.
 HARDLY = 0.3
 EXISTING = "the sensors that are there"
 
@@ -155,7 +155,7 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
         "where": best.sensor if best.place is not None else f"{EXISTING}, above all {best.channel}",
         "quantity": "displacement" if best.displaced else "temperature",
         "condition": best.trial.name,
-        "why": why(best, between, lead_words(diagnosis, decided))
+        "why": why(best, between, lead_words(diagnosis, decided), float(-weights @ np.log2(weights)))
         + timed_words([item.fit for item in rivals]),
         "expected_information": best.information,
         "between": between,
@@ -178,8 +178,9 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
 def rivals_of(diagnosis: Diagnosis) -> tuple[list[Ranked], Array, bool]:
     """Explanations to distinguish, their probabilities, and whether only one was left."""
     judgement = diagnosis.judgement
-    found = [judgement.chosen, *judgement.alternatives][:MOST_HYPOTHESES]
-    decided = len(found) < 2
+    # What is listed without being likely is not to be told apart.
+    found = [judgement.chosen, *(i for i in judgement.alternatives if i.probability >= tuned.LISTED)]
+    found, decided = found[:MOST_HYPOTHESES], len(found) < 2
     if decided:
         ranked = rank(diagnosis.hypotheses, diagnosis.coarseness)
         others = [item for item in ranked if item.fit.keys != found[0].fit.keys]
@@ -413,8 +414,8 @@ def lead_words(diagnosis: Diagnosis, decided: bool) -> str:
     return "The data have decided; this would confirm it. " if decided else ""
 
 
-def why(option: Option, between: Sequence[str], lead: str) -> str:
-    """The reason in a sentence or two with numbers, after what leads to it."""
+def why(option: Option, between: Sequence[str], lead: str, open_bits: float) -> str:
+    """The reason in a sentence or two with numbers, after what leads to it; of what is open, in bits."""
     digits = 1 if abs(option.difference) >= 0.2 else 2
     zero, level, unit = (0.0, "µm", "µm") if option.displaced else (ZERO_CELSIUS_K, "°C", "K")
     levels = [f"{value - zero:.{digits}f} {level}" for value in option.levels]
@@ -425,7 +426,7 @@ def why(option: Option, between: Sequence[str], lead: str) -> str:
         f"{abs(option.difference) / option.spread:.1f} times what noise and unknown parameters leave "
         f"({option.spread:.2g} {unit})."
     )
-    if option.information < HARDLY:
+    if option.information < HARDLY * open_bits:
         lead += "No single test tells these apart well; this one does it best. "
-    tail = f" Expected to tell {option.information:.2f} of {np.log2(len(between)):.2f} bits."
+    tail = f" Expected to tell {option.information:.2f} of the {open_bits:.2f} bits that are open."
     return lead + text + tail

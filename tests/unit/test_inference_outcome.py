@@ -16,6 +16,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.diagnosis import overlapping_components
 from spindle_fem.inference.findings import findings_of, noise_level, predictions_at_stamps, rmse
 from spindle_fem.inference.further_tests import AGAIN, answer, reachable_places, trials_of
+from spindle_fem.inference.hypothesis import Ranked
 from spindle_fem.inference.mismatch_place import (
     main_component,
     significant_stretches,
@@ -29,6 +30,7 @@ from spindle_fem.inference.next_measurement import (
     expected_information,
     next_measurement,
     pairwise_distances,
+    rivals_of,
 )
 from spindle_fem.inference.prepared_problem import (
     known_before,
@@ -383,6 +385,18 @@ def test_chart_of_sets_has_the_probabilities_that_are_stated(reported):
     assert drawn[1 : 1 + len(stated)] == pytest.approx(stated)
     assert drawn[-1] == 0.62
     assert not any(drawn[1 + len(stated) : -1])
+
+
+def test_only_likely_alternatives_are_to_be_told_apart(heated):
+    judged = heated.judgement
+    rival = next(h for h in heated.hypotheses if h.keys != judged.chosen.fit.keys)
+    for probability, decided in ((0.5 * tuned.LISTED, True), (0.2, False)):
+        listed = replace(judged, alternatives=(Ranked(rival, probability),))
+        found, weights, alone = rivals_of(replace(heated, judgement=listed))
+        assert (alone, len(found)) == (decided, 2)
+        assert weights[1] == pytest.approx(
+            0.5 if decided else probability / (probability + judged.chosen.probability)
+        )
 
 
 def test_what_to_measure_next_is_the_same_from_another_process(heated, proposal):
