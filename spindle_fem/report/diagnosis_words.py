@@ -45,11 +45,17 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
             f"“{statements}” {_improvement(fit)}"
         )
     if verdict == "consistent":
+        others = [
+            f"{set_words(item['findings'])} ({chance(item['probability'])})"
+            for item in content["alternatives"]
+            if item["probability"] >= tuned.LISTED
+        ]
         return (
             f"The recording agrees with the machine: what differs, {kelvin(fit['after']['heldout_rmse_K'])} "
             f"on held-out readings, is noise ({kelvin(fit['noise_K'])}), the slow error allowed to sensors "
             f"and model ({kelvin(content['slow_error']['sigma_K'])}) and what the uncertain parameters "
             f"absorb within their priors (p {level(content['mismatch']['p_value'])})."
+            + (f" Not ruled out: {_or(others)}." if others else "")
         )
     if verdict == "ambiguous":
         sets = [(content["findings"], content.get("set_probability"))]

@@ -101,6 +101,17 @@ def test_a_p_value_that_says_nothing_beside_what_is_left_is_not_stated(capsys):
         assert any("nothing were missing" in words for words in confidence_words(told)) == stated
 
 
+def test_what_a_consistent_recording_does_not_rule_out_is_named():
+    told = content("consistent") | {"findings": [], "slow_error": {"sigma_K": 0.05, "time_s": 600.0}}
+    assert "Not ruled out" not in verdict_sentence(told)
+    windage = {"effect": "windage", "component": "shaft"}
+    told["alternatives"] = [
+        {"findings": [windage], "probability": 0.5},
+        {"findings": [windage, windage], "probability": 0.001},
+    ]
+    assert verdict_sentence(told).endswith(" Not ruled out: windage at the shaft (0.50).")
+
+
 def test_the_improved_machine_stands_in_the_table_with_its_own_error():
     told = content("missing_physics")
     told["fit"]["improved_machine"] = {"train_rmse_K": 0.983, "heldout_rmse_K": None}
