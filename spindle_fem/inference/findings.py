@@ -116,8 +116,7 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
     elsewhere = [c for c in fit.candidates if c is not candidate and (c.effect, followed_name(c)) == law]
     words = "".join(f" It enters at {place_words(c.component)} as well." for c in elsewhere if law[1])
     if state is None and intervals:
-        unit = parameters[candidate.amplitude.rpartition(".")[2]]["unit"]
-        words += sizes_words([item["value"] for item in intervals], unit)
+        words += sizes_words([item["value"] for item in intervals], size_unit(parameters))
     elif state is not None:
         words += state.words
         intervals = [
@@ -135,6 +134,12 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
         "statement": effect.statement(candidate, reported) + words,
         "check": effect.check_of(candidate),
     }
+
+
+def size_unit(parameters: Mapping[str, Mapping[str, Any]]) -> str:
+    """Unit of what is on in intervals, the first that a finding states; its name where it has none."""
+    name, size = next(iter(parameters.items()))
+    return size["unit"] or name
 
 
 def sizes_words(sizes: Sequence[float], unit: str) -> str:
@@ -171,7 +176,6 @@ def states_of(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     rows = []
     for item in findings:
         for interval in item["intervals"]:
-            name, size = next(iter(item["parameters"].items()))
             rows.append(
                 {
                     "start": interval["start"],
@@ -179,7 +183,7 @@ def states_of(findings: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                     "effect": item["effect"],
                     "component": item["component"],
                     "value": interval["value"],
-                    "unit": size["unit"] or name,
+                    "unit": size_unit(item["parameters"]),
                 }
                 | ({"recording": interval["recording"]} if "recording" in interval else {})
             )

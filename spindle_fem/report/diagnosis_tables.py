@@ -7,6 +7,7 @@ from operator import itemgetter
 from typing import Any
 
 from spindle_fem.effects.framework.effect import capital
+from spindle_fem.inference.findings import size_unit
 from spindle_fem.report.block_page import Cards, Notice, Table, Text
 from spindle_fem.report.diagnosis_words import (
     chance,
@@ -178,7 +179,7 @@ def set_tables(content: Mapping[str, Any]) -> list[Any]:
         )
         blocks.append(table_of(fields, parameters, f"{capital(found_words(content))}."))
     if intervals:
-        size = words("size", lambda item: _size_words(item) if "value" in item else "")
+        size = words("size", _size_words)
         blocks.append(table_of((*effect, *_FROM_TO, size), intervals, "When it is on, and how much."))
     if content["alternatives"]:
         fields = (
@@ -301,9 +302,8 @@ def _value_and_interval(title: str) -> tuple[Field, Field]:
 
 
 def _size_words(item: Mapping[str, Any]) -> str:
-    """Size in one interval of a finding, W or W/K."""
-    unit = next(value["unit"] for value in item["parameters"].values() if value["unit"] in ("W", "W/K"))
-    return f"{significant(item['value'])} {unit}"
+    """Size in one interval of a finding; folders of before have none."""
+    return f"{significant(item['value'])} {size_unit(item['parameters'])}" if "value" in item else ""
 
 
 def _in_its_unit(option: Mapping[str, Any], key: str) -> str:
