@@ -58,7 +58,8 @@ def set_probabilities(data: xr.Dataset, content: Mapping[str, Any]) -> Figure:
     axes.grid(axis="y", visible=False)
     axes.tick_params(axis="y", length=0)
     for row, (value, extra) in enumerate(zip(chance, misfit, strict=True)):
-        text = f"{value:.3f}" if value >= 5e-4 else "< 0.001"
+        # None is stated of what is ruled out or little likely; it may be more than a thousandth.
+        text = "–" if value == 0.0 else f"{value:.3f}" if value >= 5e-4 else "< 0.001"
         axes.annotate(
             f"{text}   {extra}",
             (value, row),
