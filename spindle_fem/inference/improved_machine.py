@@ -124,15 +124,14 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> Improve
     values = fit.values
     told = {name: state.candidate for name, state in diagnosis.states.items()}
     candidates = [told.get(item.amplitude, item) for item in fit.candidates]
-    errors = _errors(predictor, fit)
-    if len(predictor.recordings) > 1:
-        # An entry of a definition acts in whatever is simulated.
-        for item in candidates:
-            if item.recording is not None:
-                name = predictor.recordings[item.recording].name
-                LOGGER.warning("improved_machine.toml lacks %s, which acts in %s only", item.label, name)
-                errors = {}
-        candidates = [item for item in candidates if item.recording is None]
+    # An entry of a definition acts in whatever is simulated.
+    several = len(predictor.recordings) > 1
+    left_out = [item for item in candidates if several and item.recording is not None]
+    for item in left_out:
+        name = predictor.recordings[item.recording].name
+        LOGGER.warning("improved_machine.toml lacks %s, which acts in %s only", item.label, name)
+    candidates = [item for item in candidates if not several or item.recording is None]
+    errors = {} if left_out else _errors(predictor, fit)
     entries = tuple(
         EffectEntry.model_validate(definition_entry(item, candidate_values(item, values)))
         for item in candidates
