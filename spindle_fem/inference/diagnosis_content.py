@@ -139,10 +139,11 @@ def _reasons(opened: DiagnosedMachine, judgement: Judgement) -> tuple[str, ...]:
 def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The machine's own parameters before and after, those apart that no key of the definition has."""
     fit, rows = diagnosis.stated_fit, []
+    sigmas = fit.stated_sigmas
     for coordinate in diagnosis.machine_coordinates:
         if coordinate.name.startswith((MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)):
             continue
-        low, high = fit.stated_interval(coordinate.name, NORMAL_90_PERCENT)
+        low, high = fit.interval(coordinate.name, NORMAL_90_PERCENT, sigmas)
         rows.append(
             {
                 "name": coordinate.name,

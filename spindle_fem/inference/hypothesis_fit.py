@@ -132,15 +132,12 @@ class Fit:
         told = np.maximum(1.0 / np.diag(self.covariance) - known, 0.0)
         return (known + told / tuned.INTERVAL_WIDENING**2) ** -0.5
 
-    def interval(self, name: str, level_sigmas: float) -> tuple[float, float]:
-        """Values at ``level_sigmas`` posterior standard deviations to either side."""
-        return self._interval(name, level_sigmas, np.sqrt(np.diag(self.covariance)))
+    def interval(self, name: str, level_sigmas: float, sigmas: Array | None = None) -> tuple[float, float]:
+        """Values at ``level_sigmas`` standard deviations to either side.
 
-    def stated_interval(self, name: str, level_sigmas: float) -> tuple[float, float]:
-        """Values at ``level_sigmas`` of :attr:`stated_sigmas` to either side."""
-        return self._interval(name, level_sigmas, self.stated_sigmas)
-
-    def _interval(self, name: str, level_sigmas: float, sigmas: Array) -> tuple[float, float]:
+        Those of the posterior by default, or other ones of all coordinates, such as :attr:`stated_sigmas`.
+        """
+        sigmas = np.sqrt(np.diag(self.covariance)) if sigmas is None else sigmas
         index = next(i for i, c in enumerate(self.coordinates) if c.name == name)
         coordinate, spread = self.coordinates[index], level_sigmas * float(sigmas[index])
         ends = [

@@ -35,21 +35,22 @@ def misdescription_content(diagnosis: Diagnosis) -> dict[str, Any]:
         "left_open": _rows(*final),
         "instead": _rows(*null) if found else [],
         "measure": _to_measure(*(null if found else final)),
-        "wrong": None if wrong is None else _row(*final, wrong),
+        "wrong": None if wrong is None else _row(*final, wrong, final[1].stated_sigmas),
     }
 
 
 def _rows(predictor: Predictor, fit: Fit) -> list[dict[str, Any]]:
-    rows = [_row(predictor, fit, item) for item in predictor.misdescribed]
+    sigmas = fit.stated_sigmas
+    rows = [_row(predictor, fit, item, sigmas) for item in predictor.misdescribed]
     moved = [row for row in rows if abs(row["sigmas"]) >= MOVED]
     return sorted(moved, key=lambda row: -abs(row["sigmas"]))[:MOST_LISTED]
 
 
-def _row(predictor: Predictor, fit: Fit, item: Misdescription) -> dict[str, Any]:
-    """One direction in one fit."""
+def _row(predictor: Predictor, fit: Fit, item: Misdescription, sigmas: np.ndarray) -> dict[str, Any]:
+    """One direction in one fit, whose standard deviations are stated as ``sigmas``."""
     late = _late_already(predictor, item)
     value = fit.values[item.coordinate] + late
-    low, high = fit.stated_interval(item.coordinate, NORMAL_90_PERCENT)
+    low, high = fit.interval(item.coordinate, NORMAL_90_PERCENT, sigmas)
     largest, channel, swing, sensor = 0.0, "", 0.0, ""
     for number, recording in enumerate(predictor.recordings):
         column = predictor.column_of(number, item.coordinate)
@@ -101,6 +102,6 @@ def _to_measure(predictor: Predictor, fit: Fit) -> dict[str, Any] | None:
             best, most = item, float(widths)
     if best is None:
         return None
-    row = _row(predictor, fit, best)
+    row = _row(predictor, fit, best, fit.stated_sigmas)
     why = f"the readings hold it {most:.1f} standard deviations off the definition"
     return {"key": best.key, "name": best.name, "expected": row["value"], "unit": best.unit, "why": why}

@@ -211,7 +211,7 @@ def test_known_parameters_lie_within_their_intervals(blank, tmp_path):
             inside += low < value < high
             assert high / low < 1.3, name
             # What is stated is wider by what an inexact model adds, and no wider than what was known.
-            stated = np.log(fit.stated_interval(name, 1.645))
+            stated = np.log(fit.interval(name, 1.645, fit.stated_sigmas))
             assert 1.3 < (stated[1] - stated[0]) / np.log(high / low) < 1.01 * INTERVAL_WIDENING, name
         assert (fit.stated_sigmas[: len(belief.mean)] <= 1.0 + 1e-9).all()
         assert fit.reduced_misfit == pytest.approx(1.0, abs=0.15)
