@@ -247,7 +247,7 @@ SAME_READINGS = 0.2
 LISTED = 0.02
 # Level of the p-value below which something is missing, and below which nothing missing is ruled out;
 # between both nothing missing is at most this probable, above at least; and on a drawn machine no more below
-# the last: of five such among 32 consistent ones (seed 587) four hide an effect, of the others eight.
+# the last: of five such among 35 told consistent (seed 587) four hide an effect, of the others six.
 SIGNIFICANT, RULED_OUT, STILL_POSSIBLE, DOUBTFUL = 0.01, 0.001, 0.5, 0.1
 # Root of the misfit per datum after the best set above which something else must be there.
 UNEXPLAINED_MISFIT = 1.6

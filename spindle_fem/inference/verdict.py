@@ -247,7 +247,7 @@ def _not_named(sets: _Weighed, asked: _Asked) -> Judgement:
     if not (much_left or (impossible and more_left)) or (left <= tuned.MOST_LEFT and in_prior):
         _, others = as_one([empty, *(i for i in kept if i.fit.candidates)], asked.overlapping)
         # What chance or the prior holds is as likely as not, whatever evidence says; sets share the rest.
-        nothing = max(0.0 if doubtful else empty.probability, tuned.STILL_POSSIBLE)
+        nothing = tuned.STILL_POSSIBLE if doubtful else max(empty.probability, tuned.STILL_POSSIBLE)
         rest = sum(i.probability for i in others)
         share = min(1.0, (1.0 - nothing) / max(rest, np.finfo(float).tiny))
         rivals = (replace(i, probability=share * i.probability) for i in others)
@@ -258,7 +258,7 @@ def _not_named(sets: _Weighed, asked: _Asked) -> Judgement:
     # The residual is there, and no set of the catalogue makes it likelier.
     p_value, reason = sets.p_value, CONTRADICTED_REASON
     if much_left:
-        # With the slow error that is left of the readings none is so large that it could not be one.
+        # The slow error was chosen by what is left, so that the misfit alone may speak for chance.
         p_value = min(p_value, float(chdtrc(len(empty.fit.residual), empty.fit.misfit)))
         much = f"{left:.1f} times" if left > tuned.MOST_LEFT else "more than"
         reason = f"the readings differ from the model by {much} the noise, and no effect explains it"
