@@ -167,17 +167,17 @@ class BoxedColumns:
         side = held.sides(sets, amplitudes)
         moved = np.any(side != held.side, axis=1) | refused.any(axis=1)
         for index in np.flatnonzero(moved):
-            costs[index] = self.cost(sets[index], spread, one_sided, side[index])
+            costs[index], _ = self.least(sets[index], spread, one_sided, side[index])
         return costs
 
-    def cost(
+    def least(
         self,
         members: Sequence[int],
         spread: Array,
         one_sided: Array,
         begin: NDArray[np.int64] | None = None,
-    ) -> float:
-        """Least of the quadratic form with the columns of one set, amplitudes included.
+    ) -> tuple[float, Array]:
+        """Least of the quadratic form with the columns of one set, and their amplitudes there, (s,).
 
         Parameters as of :meth:`costs`; ``begin`` says which of the box's coordinates may be held, as
         :func:`bounded_minimum` has it.
@@ -194,7 +194,7 @@ class BoxedColumns:
         high = np.concatenate((self.box.high, np.full(len(own), np.inf)))
         side = None if begin is None else np.append(begin, np.zeros(len(own), dtype=int))
         move = bounded_minimum(matrix, right, low, high, side)
-        return self.box.cost + float(move @ (matrix @ move)) - 2.0 * float(right @ move)
+        return self.box.cost + float(move @ (matrix @ move)) - 2.0 * float(right @ move), move[p:]
 
 
 @dataclass(frozen=True, slots=True)

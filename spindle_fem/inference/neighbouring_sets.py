@@ -18,6 +18,7 @@ from spindle_fem.inference.hypothesis import identity
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.hypothesis_search import Search, Task
 from spindle_fem.inference.missing_heat import OnOff
+from spindle_fem.inference.screening import is_far_off
 from spindle_fem.inference.worker_processes import Workers, of_candidates
 
 # Kind of a candidate that only changes what a channel shows.
@@ -87,7 +88,7 @@ def _in_place_of(
     There the machine is as it is known best: about what the others alone leave, it has taken up part of what
     the member does. Intervals, which fit almost anything, are sought beside others only, or in the place of
     such; the member's own are tried at every other spot too. What else a lying sensor may do is tried
-    whatever it promises: to first order it says little.
+    whatever it promises, and the other forms of a factor that is far off: to first order both say little.
     """
     left = search.problem.simulated(*without(fit, member), iterations=0)
     if left is None:  # without the member, its others run away
@@ -99,17 +100,22 @@ def _in_place_of(
     least = -tuned.EXCHANGE_PROMISES * reach
     tried: Counter[str] = Counter()
     warmed = {_bearings_warmed(search, member)}
+    far_off: set[tuple[str, str]] = set()
     tasks: list[Task] = []
     for index, amplitude in screened.best_of(lambda c: c is not member, len(gains)):
-        candidate = screened.variants[index].candidate
+        variant = screened.variants[index]
+        candidate = variant.candidate
         bearings = _bearings_warmed(search, candidate)
         if bearings and bearings in warmed:
             continue
         warmed.add(bearings)
         tried[candidate.effect] += 1
         good = gains[index] >= least and tried[candidate.effect] <= tuned.OTHER_SPOTS
-        if (good and len(tasks) < tuned.EFFECTS_EXCHANGED) or _of_one_sensor(candidate, member):
-            tasks.append(search.task(left, [(screened.variants[index], amplitude)], intervals))
+        chosen = good and len(tasks) < tuned.EFFECTS_EXCHANGED
+        if chosen and is_far_off(variant, amplitude):
+            far_off.add(variant.key)
+        if chosen or variant.key in far_off or _of_one_sensor(candidate, member):
+            tasks.append(search.task(left, [(variant, amplitude)], intervals))
     return tasks
 
 

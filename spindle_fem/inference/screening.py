@@ -13,13 +13,15 @@ from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun, Variant
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
-from spindle_fem.inference.linearised_fit import BoxedColumns, LinearProblem
+from spindle_fem.inference.linearised_fit import BoxedColumns, HeldColumns, LinearProblem
 from spindle_fem.inference.worker_processes import Workers
 
 Array = NDArray[np.float64]
 
 # Number of pieces into which variants are divided to compute their responses in parallel.
 PIECES = 2
+# Rounds in which size and prior of a factor are brought together; they change by a hundredth in the last.
+SIZE_ROUNDS = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +93,15 @@ class Screened:
         return np.where(allowed, gain, -np.inf)
 
     def amplitudes(self, members: Sequence[int]) -> dict[int, float]:
-        """Most probable amplitudes of a set, in units of the references."""
+        """Most probable amplitudes of a set, in units of the references.
+
+        Within bounds where those of the machine's own coordinates matter: free of them, a weak effect may be
+        made fifty times too strong by what the machine cannot do.
+        """
         sets = np.asarray(members)
+        if self.boxed is not None:
+            _, within = self.boxed.least(sets, self.spread, self.signs != 0.0)
+            return dict(zip(members, within.tolist(), strict=True))
         matrix = self.gram[np.ix_(sets, sets)] + np.diag(1.0 / self.spread[sets] ** 2)
         found = np.linalg.solve(matrix, self.data[sets])
         return dict(zip(members, found.tolist(), strict=True))
@@ -246,10 +255,14 @@ def screen(
     for first, found in enumerate(answers):
         columns[:, first::PIECES] = found
     gram, data, total = linear.gram(columns)
-    spread = np.array([amplitude_spread(v) for v in variants])
     signs = np.array([is_one_sided(v) for v in variants])
     priors = log_priors(variants, weights)
     boxed = linear.boxed(columns) if linear.box.matters or trust is not None else None
+    if boxed is None:
+        spread = spreads_at_size(variants, gram, data)
+    else:
+        held = HeldColumns.of(boxed)
+        spread = spreads_at_size(variants, held.with_columns, held.with_residual)
     base = linear.box.cost
     if trust is not None:
         base = float(np.sum((linear.weight * trust.residual) ** 2)) + trust.misfit_with_prior - trust.misfit
@@ -275,6 +288,35 @@ def amplitude_spread(variant: Variant) -> float:
     return item.sigma / abs(candidate.reference - candidate.null)
 
 
+def spreads_at_size(variants: Sequence[Variant], gram: Array, data: Array) -> Array:
+    """Prior standard deviations of amplitudes with which a square costs what their priors do, (m,).
+
+    To first order readings answer to a factor ``f`` as to ``f - 1``, or as to ``1 / f - 1`` where it is one
+    on a conductance in a row; its prior is normal in the logarithm. A size ``s``, where the data have it, so
+    counts as ``log(1 + s)``: a contact that conducts a twentieth is three deviations off, not nineteen.
+
+    Parameters
+    ----------
+    gram, data : (m, m) and (m,) ndarray
+        Inner products as :class:`Screened` has them.
+    """
+    own = np.array([amplitude_spread(v) for v in variants])
+    unit = np.array([_logarithm_of_reference(v) for v in variants])
+    spread = own
+    for _ in range(SIZE_ROUNDS):
+        size = np.abs(unit * data) / (np.diag(gram) + spread**-2.0)
+        spread = np.where(size > 0.0, own * size / np.log1p(np.where(size > 0.0, size, 1.0)), own)
+    return spread
+
+
+def _logarithm_of_reference(variant: Variant) -> float:
+    """By which the logarithm of an amplitude changes with its reference; 0 of one without logarithm."""
+    candidate = variant.candidate
+    if not candidate.parameters[candidate.amplitude].logarithmic:
+        return 0.0
+    return float(np.log(candidate.reference / candidate.null))
+
+
 def is_one_sided(variant: Variant) -> float:
     """1 where an amplitude cannot be negative, 0 where it can."""
     candidate = variant.candidate
@@ -298,9 +340,23 @@ def amplitude_value(variant: Variant, scaled: float) -> float:
 def amplitude_to_begin_from(variant: Variant, scaled: float) -> float:
     """Amplitude that a fit begins from, where the linearised problem has it so many times the reference.
 
-    The first order of a logarithm says nothing far off: a conductance of nothing has no slope to return by.
+    A factor as far off as :func:`spreads_at_size` has it, and not farther than ``tuned.FARTHEST_START``: a
+    conductance of nothing has no slope to return by.
     """
-    if variant.candidate.parameters[variant.candidate.amplitude].logarithmic:
+    unit = _logarithm_of_reference(variant)
+    if unit:
         most = tuned.FARTHEST_START * amplitude_spread(variant)
-        scaled = float(np.clip(scaled, -most, most))
+        scaled = float(np.clip(_logarithm_at(variant, scaled) / unit, -most, most))
     return amplitude_value(variant, scaled)
+
+
+def is_far_off(variant: Variant, scaled: float) -> bool:
+    """Whether an amplitude, in units of the reference, is a factor of which the first order says little."""
+    item = variant.candidate.parameters[variant.candidate.amplitude]
+    return item.logarithmic and abs(_logarithm_at(variant, scaled)) > tuned.FACTOR_FAR_OFF * item.sigma
+
+
+def _logarithm_at(variant: Variant, scaled: float) -> float:
+    """Logarithm of a factor so many times as far off as its reference to first order."""
+    size = scaled * _logarithm_of_reference(variant)
+    return float(np.copysign(np.log1p(abs(size)), size))

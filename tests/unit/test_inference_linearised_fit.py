@@ -48,7 +48,9 @@ def test_the_least_cost_within_bounds_is_the_true_one(room, members):
     bounds = [(-room, room)] * COORDINATES + [(0.0, None) if one_sided[i] else (None, None) for i in own]
     start = np.zeros(COORDINATES + len(own))
     found = minimize(cost, start, bounds=bounds, method="L-BFGS-B", options={"ftol": 1e-15, "gtol": 1e-10})
-    assert boxed.cost(members, spread, one_sided) == pytest.approx(found.fun, rel=1e-7)
+    least, amplitudes = boxed.least(members, spread, one_sided)
+    assert least == pytest.approx(found.fun, rel=1e-7)
+    assert amplitudes == pytest.approx(found.x[COORDINATES:], abs=1e-4)
 
 
 @pytest.mark.parametrize("room", [0.05, 0.3, 1.0, 50.0])
@@ -58,7 +60,7 @@ def test_many_sets_cost_what_each_does_alone(room, size):
     spread = np.array([0.5, 1.0, 2.0, 0.3, 1.0])
     one_sided = np.array([True, False, True, False, True])
     sets = np.array(list(combinations(range(COLUMNS), size)))
-    alone = [boxed.cost(members, spread, one_sided) for members in sets]
+    alone = [boxed.least(members, spread, one_sided)[0] for members in sets]
     assert boxed.costs(sets, spread, one_sided) == pytest.approx(alone, rel=1e-9)
 
 

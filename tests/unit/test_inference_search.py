@@ -23,7 +23,9 @@ from spindle_fem.inference.screening import (
     amplitude_spread,
     amplitude_to_begin_from,
     amplitude_value,
+    is_far_off,
     log_priors,
+    spreads_at_size,
 )
 
 STOP, COUNT = 14400.0, 40
@@ -169,14 +171,31 @@ def test_amplitudes_go_back_to_values(logarithmic):
     assert amplitude_value(item, 100.0) == 3.0
 
 
-def test_a_factor_begins_no_further_off_than_its_prior_reaches():
+def test_a_factor_begins_where_its_resistance_is_and_no_further_off_than_its_prior_reaches():
     item = Variant(candidate("x", logarithmic=True, value=1.0, low=0.0, high=np.inf), {})
+    unit = np.log(item.candidate.reference)
+    # Of a conductance the first order is one of its resistance.
+    assert amplitude_to_begin_from(item, -1.5 / unit) == pytest.approx(1.0 / 2.5)
+    assert amplitude_to_begin_from(item, 1.5 / unit) == pytest.approx(2.5)
     farthest = tuned.FARTHEST_START * amplitude_spread(item)
-    assert amplitude_to_begin_from(item, 0.5) == amplitude_value(item, 0.5)
-    assert amplitude_to_begin_from(item, -5000.0) == pytest.approx(amplitude_value(item, -farthest))
+    assert amplitude_to_begin_from(item, -1e9) == pytest.approx(amplitude_value(item, -farthest))
     assert amplitude_value(item, -5000.0) == 0.0  # where a logarithm would begin at minus infinity
     straight = Variant(candidate("x", logarithmic=False, value=0.0, low=-1e6, high=1e6), {})
     assert amplitude_to_begin_from(straight, 5000.0) == amplitude_value(straight, 5000.0)
+
+
+@pytest.mark.parametrize("true", [0.04, 0.3, 1.02, 6.0])
+def test_a_factor_pays_for_its_logarithm_however_far_off_it_is(true):
+    item = Variant(candidate("x", logarithmic=True, value=1.0, low=0.0, high=np.inf), {})
+    own, unit = amplitude_spread(item), abs(np.log(item.candidate.reference))
+    size = max(true, 1.0 / true) - 1.0
+    gram = np.array([[1e6]])  # readings that tell the size
+    (spread,) = spreads_at_size([item], gram, gram[0] * size / unit)
+    deviations = abs(np.log(true)) / unit / own
+    assert size / unit / spread == pytest.approx(deviations, rel=1e-3)
+    assert is_far_off(item, size / unit) == (deviations > tuned.FACTOR_FAR_OFF)
+    straight = Variant(candidate("x", logarithmic=False, value=0.0), {})
+    assert spreads_at_size([straight], gram, gram[0]) == [amplitude_spread(straight)]
 
 
 # ------------------------------------------------------------------ missing heat
