@@ -381,6 +381,24 @@ def test_contact_resistance_without_contact_is_infinite() -> None:
     assert contact_resistance(empty) == (math.inf, math.inf)
 
 
+def test_unloaded_balls_keep_the_wedge_of_oil_at_rest_and_just_above() -> None:
+    """F3 under 6500 N carries nothing: 30 k 2π √(R_x R_y) ln 2, with no jump where the speed begins."""
+
+    def paths(rpm: float, thrust: float):
+        states = solve_bearing_set(TBT, turn(rpm), thrust, WARM, lubricant=GREASE, control="outer")
+        return ball_conductance(states[2], GREASE)
+
+    still, barely, loaded = paths(0.0, 6500.0), paths(1e-4, 6500.0), paths(0.0, 1750.0)
+    ball = 0.5 * BEARING.ball_diameter
+    # at the contact angle of about 15°; the inner raceway rolls on a smaller radius than the outer
+    across = ball / (1.0 - 0.5 / BEARING.groove_curvature_inner)
+    along = ball * (1.0 - BEARING.diameter_ratio * math.cos(math.radians(15.0)))
+    wedge = 30 * GREASE.thermal_conductivity * 2.0 * math.pi * math.sqrt(along * across) * math.log(2.0)
+    assert still.inner == pytest.approx(wedge, rel=0.01)
+    assert (still.inner, still.outer) == pytest.approx((barely.inner, barely.outer), rel=0.01)
+    assert still.inner < loaded.inner < 2.0 * still.inner
+
+
 @pytest.mark.parametrize("rpm", [0.0, 3000.0])
 def test_other_heat_models_of_the_same_equilibrium_come_beside(rpm: float) -> None:
     def states(heat: HeatOptions):

@@ -17,6 +17,7 @@ from spindle_fem.model.lumped.machine_network import build_machine_network
 from spindle_fem.model.lumped.operating_state import operate
 from spindle_fem.operation.bearing_heat import BearingTemperatures, heat_model_of
 from spindle_fem.operation.friction_map import film_temperature
+from spindle_fem.operation.friction_map import tabulate_friction as tabulate_speeds
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.solvers.machine_network_steady import network_heat_model, solve_machine_network
 from spindle_fem.solvers.preload_runaway import beyond_the_branch, no_equilibrium
@@ -158,3 +159,14 @@ def test_a_fold_is_said_before_where_the_search_ended():
     text = str(beyond_the_branch(error, other))
     assert "4000 rpm: lubricant temperature" in text
     assert "exists up to about 2126 rpm: too thin an oil." in text
+
+
+def test_a_row_without_load_keeps_its_heat_path_at_standstill(friction_machine):
+    """F3 of the reference spindle lifts off under 6500 N; at rest the wedge of lubricant joins its balls."""
+    network, point, model = friction_machine
+    friction_map = tabulate_speeds(network.spec, point.speed, (1750.0, 6500.0))
+    assert np.all(np.isfinite(friction_map.nominal_conductance(0.0, 1750.0)))
+    assert friction_map.nominal_conductance(0.0, 6500.0)[2] == pytest.approx([0.64, 0.69], rel=0.05)
+    still = replace(point, speed=0.0, thrust=9000.0)
+    found = solve_machine_network(network, still, heat_model=model)
+    assert np.all(np.isfinite(found.temperature))

@@ -47,7 +47,8 @@ class BallConductance:
     inner, outer : float, [W/K]
         Raceway to the balls' middle: through the contact, and the lubricant around the ball beside it.
     inner_contact, outer_contact : float, [W/K]
-        Through the contact alone: both bodies, half the ball, and the film between them.
+        Through the contact alone: both bodies, half the ball, and the film between them; the wedge of
+        lubricant where there is no contact.
     lubricant : float, [W/K]
         Film of the lubricant in the balls' path, to each raceway.
     """
@@ -162,25 +163,45 @@ def renewal_resistance(
         return np.where(area * moving > 0.0, _ELLIPSE * depth / (thermal_conductivity * area), np.inf)
 
 
-def film_conductance(state: BearingState, thermal_conductivity: float) -> FloatArray:
-    """Conductance of the oil film in every contact and of the oil that fills the gap around it, W/K.
+def oil_wedge(state: BearingState, thermal_conductivity: float) -> FloatArray:
+    """Conductance of the oil between ball and raceway as far as the gap doubles, 2π k √(R_x R_y) ln 2, W/K.
 
-    k (A/h + 2π √(R_x R_y) ln 2): the flat film, and the wedge around it as far as the gap doubles.
+    k times the integral of 1/(h + x²/2R_x + y²/2R_y) from h to 2 h; h itself drops out of it.
+
+    Parameters
+    ----------
+    thermal_conductivity : float, [W/(m K)]
+        Of the oil.
+
+    Returns
+    -------
+    (n, 2) ndarray, [W/K]
+
+    Range: gaps far below the ball's radius, over which the surfaces are paraboloids.
+
+    Reference bearing, grease: 0.02 W/K a ball.
+    """
+    geometry = state.geometry
+    ratio = geometry.diameter_ratio * np.cos(state.balls.contact_angle)
+    grooves = np.array([geometry.groove_curvature_inner, geometry.groove_curvature_outer])
+    along = 1.0 / (1.0 + ratio / (1.0 - ratio)), 1.0 / (1.0 - ratio / (1.0 + ratio))
+    rolling = 0.5 * geometry.ball_diameter * np.stack((along[0][:, 0], along[1][:, 1]), axis=1)
+    across = 0.5 * geometry.ball_diameter / (1.0 - 0.5 / grooves)
+    return 2.0 * np.pi * thermal_conductivity * np.sqrt(rolling * across) * math.log(_WEDGE_END)
+
+
+def film_conductance(state: BearingState, thermal_conductivity: float) -> FloatArray:
+    """Conductance of the oil film in every contact, k A/h, and of the wedge of oil around it, W/K.
 
     Returns
     -------
     (n, 2) ndarray, [W/K]
         NaN where there is no film.
     """
-    geometry, balls = state.geometry, state.balls
+    balls = state.balls
     area = np.pi * balls.semi_major * balls.semi_minor
-    ratio = geometry.diameter_ratio * np.cos(balls.contact_angle)
-    grooves = np.array([geometry.groove_curvature_inner, geometry.groove_curvature_outer])
-    along = 1.0 / (1.0 + ratio / (1.0 - ratio)), 1.0 / (1.0 - ratio / (1.0 + ratio))
-    rolling = 0.5 * geometry.ball_diameter * np.stack((along[0][:, 0], along[1][:, 1]), axis=1)
-    across = 0.5 * geometry.ball_diameter / (1.0 - 0.5 / grooves)
-    wedge = 2.0 * np.pi * np.sqrt(rolling * across) * math.log(_WEDGE_END)
-    return thermal_conductivity * (area / balls.film_central + wedge)
+    wedge = oil_wedge(state, thermal_conductivity)
+    return thermal_conductivity * area / balls.film_central + wedge
 
 
 def contact_resistance(
@@ -194,12 +215,12 @@ def contact_resistance(
 
     Per ball: what resists in the ring and in the ball, half the ball and, with lubricant, the film between.
     Each body conducts as at rest and as it does with a surface that is renewed, whichever is more, with a
-    smooth passage.
+    smooth passage. A ball that hardly touches, or not at all, has the wedge of lubricant instead.
 
     Returns
     -------
     (inner, outer) : float, [K/W]
-        Infinite where no ball touches.
+        Infinite where no ball touches and there is no lubricant.
 
     Source: Muzychka & Yovanovich (2001), for the passage (root of the sum of squares).
     """
@@ -210,10 +231,12 @@ def contact_resistance(
         moving = renewal_resistance(balls.semi_major, balls.semi_minor, balls.entrainment_speed, conductivity)
         with np.errstate(divide="ignore"):
             resistance = resistance + 1.0 / np.hypot(1.0 / still, 1.0 / moving)
+    least = 0.0
     if lubricant is not None:
         film = film_conductance(state, lubricant.thermal_conductivity)
         resistance = resistance + np.where(np.isfinite(film), 1.0 / film, 0.0)
-    conductance = balls.weight @ (1.0 / resistance)
+        least = oil_wedge(state, lubricant.thermal_conductivity)
+    conductance = balls.weight @ np.maximum(1.0 / resistance, least)
     with np.errstate(divide="ignore"):
         inner, outer = 1.0 / conductance
     return float(inner), float(outer)
@@ -319,6 +342,7 @@ __all__ = [
     "constriction_resistance",
     "contact_resistance",
     "film_conductance",
+    "oil_wedge",
     "renewal_resistance",
     "roller_resistance",
 ]
