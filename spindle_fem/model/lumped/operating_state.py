@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
 
 from spindle_fem.definition.machine_spec import NaturalFilm
 from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.model.lumped.ball_contacts import BallContactLaw, ContactFaces
 from spindle_fem.model.lumped.friction_table import FrictionTables
 from spindle_fem.model.lumped.heat_laws import (
+    ChannelFilm,
     CircuitLaw,
     CoolantLaw,
     FrictionLaw,
@@ -35,8 +34,6 @@ from spindle_fem.operation.friction_map import film_temperature
 from spindle_fem.operation.heat_shares import heat_shares
 from spindle_fem.operation.loads import BearingHeat
 from spindle_fem.operation.operating_point import OperatingPoint
-from spindle_fem.physics.coolant.channel_section import ChannelSection
-from spindle_fem.physics.coolant.properties import Coolant
 from spindle_fem.physics.coolant.regimes import ChannelState, select_film
 from spindle_fem.recordings.source_heat import source_heat
 
@@ -45,9 +42,6 @@ Law = WallFilmLaw | CoolantLaw | CircuitLaw | FrictionLaw | BallContactLaw
 # Wall less fluid, K; the points lie close because the coefficient has a cusp where both are equal.
 FILM_RANGE = (-60.0, 140.0)
 FILM_POINTS = 801
-TABLE_POINTS = 24
-# Flows whose films are remembered.
-TABLES_KEPT = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -366,18 +360,6 @@ def _pumping(machine: MachineNetwork, point: OperatingPoint) -> Array:
     return power * coolant.area / coolant.area.sum()
 
 
-@lru_cache(maxsize=TABLES_KEPT)
-def _film_table(
-    coolant: Coolant, section: ChannelSection, model: str, flow: float, factor: float
-) -> RectBivariateSpline:
-    """Film coefficient over bulk and wall temperature, W/(m²·K)."""
-    bulk = np.linspace(coolant.lowest_temperature, coolant.highest_temperature, TABLE_POINTS)
-    wall = np.linspace(coolant.lowest_temperature, coolant.highest_temperature, 2 * TABLE_POINTS)
-    state = ChannelState(coolant, flow, np.repeat(bulk, len(wall)), np.tile(wall, len(bulk)))
-    value = factor * np.asarray(select_film(model, section, state).value, dtype=float)
-    return RectBivariateSpline(bulk, wall, value.reshape(len(bulk), len(wall)))
-
-
 def coolant_law(machine: MachineNetwork, point: OperatingPoint) -> CoolantLaw:
     """The enthalpy march as streams and conductances; film by the definition's correlation."""
     coolant, settings = machine.coolant, machine.spec.coolant
@@ -387,10 +369,9 @@ def coolant_law(machine: MachineNetwork, point: OperatingPoint) -> CoolantLaw:
     start, n = machine.coolant_start, len(coolant.area)
     nodes = np.arange(start, start + n)
     factor = settings.film_factor.value
-    bulk_range = wall_range = (loop.coolant.lowest_temperature, loop.coolant.highest_temperature)
-    film: RectBivariateSpline | float
+    film: ChannelFilm | float
     if settings.properties_at == "bulk":
-        film = _film_table(loop.coolant, loop.section, settings.film_model, point.coolant_flow, factor)
+        film = ChannelFilm(loop.coolant, loop.section, settings.film_model, point.coolant_flow, factor)
     else:
         state = ChannelState(loop.coolant, point.coolant_flow, np.float64(inlet), None)
         film = factor * float(select_film(settings.film_model, loop.section, state).value)
@@ -404,6 +385,4 @@ def coolant_law(machine: MachineNetwork, point: OperatingPoint) -> CoolantLaw:
         capacity_rate=rate,
         inlet=inlet,
         film=film,
-        bulk_range=bulk_range,
-        wall_range=wall_range,
     )
