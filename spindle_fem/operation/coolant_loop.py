@@ -11,10 +11,13 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.machine.geometry.coolant_path import CoolantPath
 from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.coolant.duct_films.straight import nusselt_straight
 from spindle_fem.physics.coolant.duct_friction import PressureDrop
-from spindle_fem.physics.coolant.film_models.sieder_tate import nusselt_sieder_tate
+from spindle_fem.physics.coolant.duct_kinds.bore import bore
+from spindle_fem.physics.coolant.ducts import DuctShape
 from spindle_fem.physics.coolant.march import ChannelMarch, DrivenChannel, FilmChoice
 from spindle_fem.physics.coolant.regimes import ChannelState, select_film
+from spindle_fem.validity import CodedWarning
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +35,7 @@ class CoolantState:
     film_low: NDArray[np.float64]
     film_high: NDArray[np.float64]
     pressure: PressureDrop
+    warnings: tuple[CodedWarning, ...]
 
 
 class CoolantLoop:
@@ -83,7 +87,12 @@ class CoolantLoop:
             np.broadcast_to(factor * np.asarray(item), shape)
             for item in (march.film.value, march.film.low, march.film.high)
         )
-        return CoolantState(march, value, low, high, pressure)
+        warnings = (
+            *march.film.warnings,
+            *pressure.warnings,
+            *self._port_warnings(point.coolant_flow, point.coolant_inlet_temperature),
+        )
+        return CoolantState(march, value, low, high, pressure, warnings)
 
     def outlets(
         self, point: OperatingPoint, walls: NDArray[np.float64], *, film_factor: float = 1.0
@@ -131,8 +140,8 @@ class CoolantLoop:
     def cell_factors(self, flow: ArrayLike, inlet: ArrayLike) -> NDArray[np.float64]:
         """Factor on the film of each cell along the channel, (..., n_along).
 
-        Where the coolant enters and leaves by drillings, their film (short
-        tubes, thermally developing) over that of the channel.
+        Where the coolant enters and leaves by drillings, their film (short straight ducts, of any
+        regime) over that of the channel.
 
         Parameters
         ----------
@@ -142,13 +151,30 @@ class CoolantLoop:
         factor = np.tile(self.cell_factor, (*flow.shape, 1))
         if not self.cells.is_port.any():
             return factor
-        diameter, length = self.path.port_diameter, self.port_length
-        properties = self.coolant.properties(inlet)
-        velocity = flow / self.section.starts / (0.25 * np.pi * diameter**2)
-        reynolds = velocity * diameter / properties.kinematic_viscosity
-        graetz = reynolds * properties.prandtl * diameter / length
-        port = nusselt_sieder_tate(graetz, extrapolate=True) * properties.thermal_conductivity / diameter
         state = ChannelState(self.coolant, flow, inlet)
-        ratio = np.asarray(port / select_film(self.spec.coolant.film_model, self.section, state).value)
+        channel = select_film(self.spec.coolant.film_model, self.section, state, bounds=False).value
+        ratio = np.asarray(self._port_film(flow, inlet)[0] / channel)
         factor[..., self.cells.is_port] *= ratio[..., None]
         return factor
+
+    def _port_film(self, flow: ArrayLike, inlet: ArrayLike) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+        """Film of the drillings, (...) [W/(m²·K)], and violations of its range; as :meth:`cell_factors`."""
+        drilling = bore(DuctShape(self.path.port_diameter, self.port_length))
+        properties = self.coolant.properties(inlet)
+        velocity = np.asarray(flow) / self.section.starts / drilling.area
+        diameter = drilling.hydraulic_diameter
+        nusselt, faults = nusselt_straight(
+            velocity * diameter / properties.kinematic_viscosity,
+            properties.prandtl,
+            self.port_length / diameter,
+            drilling.laminar_nusselt,
+        )
+        return nusselt * properties.thermal_conductivity / diameter, faults
+
+    def _port_warnings(self, flow: float, inlet: float) -> tuple[CodedWarning, ...]:
+        """What the film of the drillings warns of."""
+        faults = self._port_film(flow, inlet)[1] if self.cells.is_port.any() else ()
+        if not faults:
+            return ()
+        text = f"Film of the coolant's drillings (Gnielinski 2013) is extrapolated: {'; '.join(faults)}."
+        return (CodedWarning("coolant_film_extrapolated", text),)

@@ -235,7 +235,7 @@ class LoadsBuilder:
                 bounds=self.film_bounds,
             )
             films |= self._channel_films(coolant)
-            warnings += [*coolant.march.film.warnings, *coolant.pressure.warnings]
+            warnings += coolant.warnings
         loads = Loads(
             surface_heat,
             films,

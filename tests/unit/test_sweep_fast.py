@@ -1,5 +1,6 @@
 """Pieces of the projected model of designs: heat tables, many channels at once, extremes of fields."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,6 +21,10 @@ from spindle_fem.operation.channel_cells import ChannelCells
 from spindle_fem.operation.coolant_loop import CoolantLoop
 from spindle_fem.operation.friction_map import FilmSeries, chebyshev_nodes, film_temperature
 from spindle_fem.operation.operating_point import OperatingPoint
+from spindle_fem.physics.coolant.duct_films import DUCT_FILMS
+from spindle_fem.physics.coolant.duct_kinds.bore import bore
+from spindle_fem.physics.coolant.ducts import DuctFlow, DuctShape
+from spindle_fem.physics.coolant.regimes import ChannelState, select_film
 from spindle_fem.studies.sweep.fast_outputs import extreme_temperatures
 
 
@@ -156,6 +161,25 @@ def test_many_channels_are_what_each_is_alone(film_model, properties_at, pumping
         assert state.enthalpy_rise[row] == pytest.approx(alone.march.march.enthalpy_rise, rel=1e-6)
         drop = pressure_drops(batch.loop, inputs)[row]
         assert drop.total == pytest.approx(alone.pressure.total, rel=1e-12)
+
+
+@pytest.mark.parametrize(("fluid", "litres"), [("iso_vg_32", 20.0), ("iso_vg_10", 60.0), ("water", 20.0)])
+def test_drillings_have_the_film_of_a_straight_duct_in_every_regime(fluid, litres):
+    """Sieder and Tate's laminar law in water at Re 38,000 gave a fifth of it."""
+    spec = load_machine("wu_tan_2016", [f"coolant.fluid={fluid}", f"coolant.flow={litres} L/min"])
+    loop, point = CoolantLoop(spec, CELLS), OperatingPoint.of(spec)
+    flow, inlet = point.coolant_flow, point.coolant_inlet_temperature
+    length = 0.011 / (np.pi * 0.01)
+    duct = DuctFlow(bore(DuctShape(0.01, length)), length, loop.coolant, flow, inlet)
+    film = DUCT_FILMS["straight"](duct).nusselt * float(duct.properties.thermal_conductivity) / 0.01
+    channel = select_film("helical", loop.section, ChannelState(loop.coolant, flow, inlet)).value
+    assert loop.cell_factors(flow, inlet) == pytest.approx(np.where(CELLS.is_port, film / channel, 1.0))
+    assert not any(
+        "drillings" in warning.text for warning in loop.at(point, np.full((1, 14), inlet)).warnings
+    )
+    short = CoolantLoop(spec, replace(CELLS, cell_area=1e-4 * np.ones((1, 14))))
+    said = [warning.text for warning in short.at(point, np.full((1, 14), inlet)).warnings]
+    assert any("slenderness" in text for text in said) == (duct.regime != "laminar")
 
 
 @settings(max_examples=20)

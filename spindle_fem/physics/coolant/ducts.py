@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from spindle_fem.correlation import Array, correlation
 from spindle_fem.physics.coolant.channel_section import ChannelSection
@@ -164,7 +165,7 @@ class DuctFlow:
     @property
     def turbulent_share(self) -> float:
         """0 in laminar, 1 in turbulent flow, linear in Re between."""
-        return float(np.clip((self.reynolds - LAMINAR_TO) / (TURBULENT_FROM - LAMINAR_TO), 0.0, 1.0))
+        return float(turbulent_share(self.reynolds))
 
     @property
     def regime(self) -> str:
@@ -194,6 +195,11 @@ class DuctFilm:
     nusselt: float
     source: str
     faults: tuple[str, ...]
+
+
+def turbulent_share(reynolds: ArrayLike) -> Array:
+    """0 in laminar, 1 in turbulent flow of a straight duct, linear in Re [-] between."""
+    return np.clip((np.asarray(reynolds, float) - LAMINAR_TO) / (TURBULENT_FROM - LAMINAR_TO), 0.0, 1.0)
 
 
 @correlation(how_to_fix="Let the duct choose by its regime.", reynolds=(4.0e3, 1.0e6))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from spindle_fem.correlation import Array, correlation
 from spindle_fem.physics.coolant.duct_films import DUCT_FILMS
@@ -12,6 +13,7 @@ from spindle_fem.physics.coolant.ducts import (
     DuctFilm,
     DuctFlow,
     friction_factor_smooth,
+    turbulent_share,
 )
 from spindle_fem.physics.coolant.film_models.straight_developing import nusselt_hausen
 
@@ -44,21 +46,42 @@ def nusselt_gnielinski_straight(reynolds: Array, prandtl: Array, slenderness: Ar
     return long * (1.0 + slenderness ** (-2.0 / 3.0))
 
 
+def nusselt_straight(
+    reynolds: ArrayLike, prandtl: ArrayLike, slenderness: float, laminar_nusselt: float
+) -> tuple[Array, tuple[str, ...]]:
+    """Mean Nusselt number of a straight smooth duct in every regime, and violations of its range.
+
+    Hausen's laminar and Gnielinski's turbulent mean, linear in Re between 2300 and 4000.
+
+    Parameters
+    ----------
+    reynolds, prandtl : (n,) array_like, [-]
+        Reynolds number on the hydraulic diameter.
+    slenderness : float, [-]
+        Length over hydraulic diameter.
+    laminar_nusselt : float, [-]
+        Developed, walls of one temperature.
+    """
+    reynolds, prandtl = np.broadcast_arrays(np.asarray(reynolds, float), np.asarray(prandtl, float))
+    laminar = nusselt_hausen(np.minimum(reynolds, LAMINAR_TO) * prandtl / slenderness, laminar_nusselt)
+    at = np.maximum(reynolds, TURBULENT_FROM)
+    turbulent = nusselt_gnielinski_straight(at, prandtl, slenderness, extrapolate=True)
+    share = turbulent_share(reynolds)
+    faults: tuple[str, ...] = ()
+    if (share > 0.0).any():
+        faults = nusselt_gnielinski_straight.faults(
+            reynolds=at[share > 0.0], prandtl=prandtl[share > 0.0], slenderness=slenderness
+        )
+    return laminar + share * (turbulent - laminar), faults
+
+
 @DUCT_FILMS.register
 def straight(flow: DuctFlow) -> DuctFilm:
     """Hausen's laminar and Gnielinski's turbulent mean, linear in Re between 2300 and 4000.
 
     Without the viscosity at the wall, and without rotation, which stirs laminar and calms turbulent flow.
     """
-    reynolds, prandtl = flow.reynolds, flow.prandtl
-    turbulent_at = {
-        "reynolds": max(reynolds, TURBULENT_FROM),
-        "prandtl": prandtl,
-        "slenderness": flow.slenderness,
-    }
-    graetz = min(reynolds, LAMINAR_TO) * prandtl / flow.slenderness
-    laminar = float(nusselt_hausen(graetz, flow.section.laminar_nusselt))
-    turbulent = float(nusselt_gnielinski_straight(**turbulent_at, extrapolate=True))
-    share = flow.turbulent_share
-    faults = nusselt_gnielinski_straight.faults(**turbulent_at) if share > 0.0 else ()
-    return DuctFilm(laminar + share * (turbulent - laminar), "Hausen 1943; Gnielinski 2013", faults)
+    nusselt, faults = nusselt_straight(
+        flow.reynolds, flow.prandtl, flow.slenderness, flow.section.laminar_nusselt
+    )
+    return DuctFilm(float(nusselt), "Hausen 1943; Gnielinski 2013", faults)
