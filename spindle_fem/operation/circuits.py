@@ -60,7 +60,7 @@ def stream_answer(film: StreamFilm, speed: float) -> StreamAnswer:
         regime=flow.regime,
         pressure_drop=flow.pressure_drop,
         source=answer.source,
-        faults=(*answer.faults, *_expansion(film, flow)),
+        faults=(*answer.faults, *flow.friction_faults, *_expansion(film, flow)),
     )
 
 

@@ -19,9 +19,10 @@ from spindle_fem.operation.circuits import (
 from spindle_fem.physics.coolant.coolants.air import Air
 from spindle_fem.physics.coolant.duct_films.straight import nusselt_gnielinski_straight
 from spindle_fem.physics.coolant.duct_films.turning import nusselt_gazley
+from spindle_fem.physics.coolant.duct_friction import channel_pressure_drop
 from spindle_fem.physics.coolant.falling_film import nusselt_schnabel
 from spindle_fem.physics.coolant.rectangular_duct import laminar_numbers
-from spindle_fem.physics.coolant.regimes import ChannelState, select_film
+from spindle_fem.physics.coolant.regimes import ChannelState, critical_reynolds_schmidt, select_film
 
 BASE = {
     "kind": "circuit", "name": "jacket", "part": "sleeve", "diameter": "100 mm", "z": ["0 mm", "60 mm"],
@@ -119,6 +120,18 @@ def test_a_stator_jacket_has_the_film_of_the_channel():
     given, taken, bulk = balance(film, [310.0] * 4)
     assert given == pytest.approx(taken, rel=1e-12)
     assert np.all(np.diff(list(bulk.values())) > 0.0)
+
+
+@pytest.mark.parametrize("law", ["helical", "straight"])
+@pytest.mark.parametrize("litres", [0.6, 6.0, 20.0, 60.0])
+def test_a_stator_jacket_has_the_friction_and_the_regimes_of_the_channel(law, litres):
+    flow = duct_flow(film_of(HELIX | {"law": law, "flow": f"{litres} L/min"}))
+    helix = flow.section.helix
+    critical = float(critical_reynolds_schmidt(helix.curvature_ratio))
+    channel = channel_pressure_drop(helix, flow.volume_flow, flow.properties, critical)
+    assert flow.pressure_drop == pytest.approx(channel.channel, rel=1e-12)
+    state = ChannelState(flow.coolant, flow.volume_flow, 293.15)
+    assert flow.regime == select_film("helical", helix, state).regime
 
 
 def test_axial_bores_with_turns_by_hand():

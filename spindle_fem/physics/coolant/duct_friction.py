@@ -258,13 +258,15 @@ def channel_pressure_drop(
         channel_power=channel * volume_flow,
         friction_factor=factor,
         reynolds=reynolds,
-        warnings=_friction_warnings(reynolds, section, critical_reynolds),
+        warnings=tuple(
+            CodedWarning("coolant_friction_extrapolated", f"Friction of the channel: {fault}.")
+            for fault in friction_faults(reynolds, section, critical_reynolds)
+        ),
     )
 
 
-def _friction_warnings(
-    reynolds: float, section: ChannelSection, critical_reynolds: float
-) -> tuple[CodedWarning, ...]:
+def friction_faults(reynolds: float, section: ChannelSection, critical_reynolds: float) -> tuple[str, ...]:
+    """How a flow leaves the range of :func:`friction_factor_channel`, if it does."""
     if reynolds <= critical_reynolds:
         dean = reynolds * np.sqrt(section.curvature_ratio)
         fault = range_fault("Dean number", dean, *friction_factor_curved_laminar.ranges["dean"])
@@ -272,6 +274,4 @@ def _friction_warnings(
         fault = range_fault(
             "Reynolds number", reynolds, 0.0, friction_factor_helical_turbulent.ranges["reynolds"][1]
         )
-    if not fault:
-        return ()
-    return (CodedWarning("coolant_friction_extrapolated", f"Friction of the channel: {fault}."),)
+    return (fault,) if fault else ()

@@ -1,4 +1,4 @@
-"""Straight ducts: what flows through one, its film and its pressure loss."""
+"""Ducts: what flows through one, its film and its pressure loss."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from numpy.typing import ArrayLike
 
 from spindle_fem.correlation import Array, correlation
 from spindle_fem.physics.coolant.channel_section import ChannelSection
+from spindle_fem.physics.coolant.duct_friction import friction_factor_channel, friction_faults
 from spindle_fem.physics.coolant.properties import Coolant, CoolantProperties
+from spindle_fem.physics.coolant.transition import critical_reynolds_schmidt, transition_weight
 from spindle_fem.validity import POSITIVE, require_range
 
 # Reynolds numbers between which a straight duct turns turbulent (Gnielinski 2013).
@@ -105,7 +107,7 @@ class DuctSection:
 
 @dataclass(frozen=True, slots=True)
 class DuctFlow:
-    """Flow through a straight duct, properties at its inlet.
+    """Flow through a duct, properties at its inlet.
 
     Attributes
     ----------
@@ -163,9 +165,18 @@ class DuctFlow:
         return (self.section.path_length or self.length) / self.section.hydraulic_diameter
 
     @property
+    def critical_reynolds(self) -> float:
+        """Reynolds number at which laminar flow ends, [-]; in a helix later."""
+        if self.section.helix is None:
+            return LAMINAR_TO
+        return float(critical_reynolds_schmidt(self.section.helix.curvature_ratio, extrapolate=True))
+
+    @property
     def turbulent_share(self) -> float:
         """0 in laminar, 1 in turbulent flow, linear in Re between."""
-        return float(turbulent_share(self.reynolds))
+        if self.section.helix is None:
+            return float(turbulent_share(self.reynolds))
+        return 1.0 - float(transition_weight(self.reynolds, self.critical_reynolds))
 
     @property
     def regime(self) -> str:
@@ -181,11 +192,25 @@ class DuctFlow:
     @property
     def pressure_drop(self) -> float:
         """Friction along the duct and its turns without what is before and after it, [Pa]."""
+        head = 0.5 * float(self.properties.density) * self.velocity**2
+        return (self._friction_factor() * self.slenderness + self.section.turn_loss) * head
+
+    def _friction_factor(self) -> float:
+        """Darcy friction factor of the duct, [-]; that of the channel in a helix."""
+        if self.section.helix is not None:
+            return float(friction_factor_channel(self.reynolds, self.section.helix, self.critical_reynolds))
         laminar = self.section.laminar_friction / min(self.reynolds, LAMINAR_TO)
         smooth = float(friction_factor_smooth(max(self.reynolds, TURBULENT_FROM), extrapolate=True))
-        factor = laminar + self.turbulent_share * (smooth - laminar)
-        head = 0.5 * float(self.properties.density) * self.velocity**2
-        return (factor * self.slenderness + self.section.turn_loss) * head
+        return laminar + self.turbulent_share * (smooth - laminar)
+
+    @property
+    def friction_faults(self) -> tuple[str, ...]:
+        """How the flow through a helix leaves the range of its friction."""
+        helix = self.section.helix
+        if helix is None:
+            return ()
+        curved = critical_reynolds_schmidt.faults(curvature_ratio=helix.curvature_ratio)
+        return (*curved, *friction_faults(self.reynolds, helix, self.critical_reynolds))
 
 
 @dataclass(frozen=True, slots=True)
