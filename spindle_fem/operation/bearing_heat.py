@@ -7,7 +7,6 @@ function of that form, entered in :func:`heat_model_of`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -433,6 +432,7 @@ class BearingMechanics:
                 conductance_inner=path.inner,
                 conductance_outer=path.outer,
                 contact_pressure=float(np.max(state.balls.pressure)),
+                ball_forces=state.ball_forces,
                 **seats.get(name, {}),
             )
             warnings += state.warnings
@@ -454,10 +454,7 @@ class BearingMechanics:
                 continue
             seats = mounted.seats
             own = [states[bearing.name] for bearing in group.bearing]
-            inner, outer = (
-                np.array([state.axial_force / math.tan(getattr(state, angle)) for state in own])
-                for angle in ("contact_angle_inner", "contact_angle_outer")
-            )
+            inner, outer = np.array([state.ball_forces for state in own]).T
             thermal = np.stack([temperatures[state.name].shifts for state in own])
             pressure, gap = seats.law(thermal, point.speed, outer - inner).seats(inner)
             for index, state in enumerate(own):

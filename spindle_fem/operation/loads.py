@@ -51,7 +51,8 @@ class BearingHeat:
     ``axial_load`` with it, ``axial_stiffness`` (N/m) that of its set; film in m; ``nan`` where a heat model
     does not give them. ``conductance_inner`` and ``conductance_outer`` (W/K) join the balls to each raceway
     and are ``nan`` where the model has no contacts. ``contact_pressure`` (Pa) is the largest
-    between ball and raceway; ``seat_pressure`` (Pa) and ``seat_gap`` (m, radial) are those of the inner
+    between ball and raceway, ``ball_forces`` (N) what all balls press each raceway radially, None where
+    unknown; ``seat_pressure`` (Pa) and ``seat_gap`` (m, radial) are those of the inner
     and the outer ring, None where no elastic bodies carry them.
     """
 
@@ -67,6 +68,7 @@ class BearingHeat:
     conductance_inner: float = float("nan")
     conductance_outer: float = float("nan")
     contact_pressure: float = float("nan")
+    ball_forces: tuple[float, float] | None = None
     seat_pressure: tuple[float, float] | None = None
     seat_gap: tuple[float, float] | None = None
 

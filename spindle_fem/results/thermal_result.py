@@ -32,6 +32,7 @@ class BearingResult:
     ``contact_angle_*`` in rad, ``film_thickness`` (central, thinner contact) in m; ``contact_pressure``
     (largest) in Pa; ``preload`` is the axial force without external load, ``axial_load`` with it,
     ``axial_stiffness`` (N/m) that of its set; ``nan`` where the heat model does not give them.
+    ``ball_forces`` (N) is what all balls press each raceway radially, None where unknown.
     """
 
     heat: float
@@ -48,6 +49,7 @@ class BearingResult:
     contact_pressure: float = float("nan")
     axial_load: float = float("nan")
     axial_stiffness: float = float("nan")
+    ball_forces: tuple[float, float] | None = None
 
     def lubricant_temperature(self, word: str) -> float:
         """Warmest that a lubricant, "grease" or "oil", is judged by, K.
@@ -279,11 +281,8 @@ class ThermalResult(Presented):
     def _ball_forces(self) -> dict[str, tuple[float, float]]:
         """Radial ball force on both raceways of every bearing, N; that of rollers is left out."""
         forces = dict(self._elastic.assembly_forces)
-        for name, bearing in self.bearings.items():
-            angles = (bearing.contact_angle_inner, bearing.contact_angle_outer)
-            if math.isfinite(bearing.axial_load) and all(angles):
-                forces[name] = tuple(bearing.axial_load / math.tan(angle) for angle in angles)
-        return forces
+        known = {name: bearing.ball_forces for name, bearing in self.bearings.items()}
+        return forces | {name: pair for name, pair in known.items() if pair is not None}
 
     @cached_property
     def displacements(self) -> dict[str, float]:

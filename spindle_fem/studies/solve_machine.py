@@ -216,6 +216,7 @@ def _bearings(coupled: CoupledState, around: Mapping[str, BearingTemperatures]) 
             contact_pressure=heat.contact_pressure,
             axial_load=heat.axial_load,
             axial_stiffness=heat.axial_stiffness,
+            ball_forces=heat.ball_forces,
         )
     return found
 

@@ -335,6 +335,22 @@ def test_radial_load_on_a_set_with_all_displacements() -> None:
     assert axial[0] + axial[1] - axial[2] == pytest.approx(500.0, rel=1e-8)
 
 
+@pytest.mark.parametrize("control", ["outer", "equilibrium"])
+@pytest.mark.parametrize("rpm", [0.0, 3000.0])
+def test_balls_press_the_raceways_with_their_groove_forces_too(rpm: float, control: str) -> None:
+    """The axial force of a ball tells the friction across each groove; what is radial follows from both."""
+    for state in solve_bearing_set(TBT, turn(rpm), 1750.0, WARM, lubricant=GREASE, control=control):
+        balls = state.balls
+        sine, cosine = np.sin(balls.contact_angle[0]), np.cos(balls.contact_angle[0])
+        across = (state.axial_force / 30.0 - balls.load[0] * sine) / cosine
+        assert state.ball_forces == pytest.approx(30.0 * (balls.load[0] * cosine - across * sine), rel=1e-6)
+        plain = state.axial_force * cosine / sine
+        assert (plain[OUTER] / state.ball_forces[OUTER] > 1.03) == (rpm > 0.0)
+    loaded = solve_bearing_set(TBT, turn(rpm), ExternalLoad(1750.0, 1000.0), WARM, control="outer")[0]
+    each = loaded.balls.load[:, INNER] * np.cos(loaded.balls.contact_angle[:, INNER])
+    assert loaded.ball_forces[INNER] == pytest.approx(each.sum(), rel=1e-9)
+
+
 def test_contact_resistance() -> None:
     state = solve_bearing(BEARING, turn(3000), 1137.2, lubricant=GREASE)
     inner, outer = contact_resistance(state, ring_conductivity=46.0, ball_conductivity=46.0)

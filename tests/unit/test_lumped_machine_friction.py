@@ -101,6 +101,13 @@ def test_network_follows_the_preload_to_its_fixed_point():
         assert heat[name] == pytest.approx(exact[name].total, rel=1e-5)
     assert 1.5 < exact["F3"].preload / spec.bearing_set[0].preload < 5.0
     assert exact["F3"].seat_pressure[1] > 0.0
+    around = state.bearing_temperatures()
+    front = [found for name, found in model.states(point, around, expand=True).items() if name[0] == "F"]
+    inner, outer = np.array([found.ball_forces for found in front]).T
+    shifts = np.stack([around[found.name].shifts for found in front])
+    law = model.sets["front"].seats.law(shifts, point.speed, outer - inner)
+    pressure = [value for found in front for value in exact[found.name].seat_pressure]
+    assert pressure == pytest.approx(law.seats(inner)[0], rel=1e-6)
     assert state.imbalance_relative < 1e-10
 
 

@@ -116,6 +116,8 @@ class BearingState:
     residual : float, [-]
     heat_beside : mapping of str to float, [W]
         Heat by the further models of ``HeatOptions.beside``.
+    ball_forces : (inner, outer) or None, [N]
+        Of all balls on each raceway, each along its own radius, friction included; None for rollers.
     """
 
     name: str
@@ -134,6 +136,7 @@ class BearingState:
     residual: float
     warnings: tuple[CodedWarning, ...]
     heat_beside: Mapping[str, float] = field(default_factory=dict)
+    ball_forces: tuple[float, float] | None = None
 
     def mean(self, name: str, side: int | None = None) -> float:
         """Mean over the balls of a field of ``BallStates`` (one contact of it).

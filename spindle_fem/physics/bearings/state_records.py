@@ -205,6 +205,7 @@ def build_states(
                 bearing.name, geometry, speed, float(np.mean(distance[0][part])) - free, radial_shift,
                 axial_force, radial_force, math.nan, stiffness, balls, bearing_heat_record,
                 total / speed if speed else 0.0, temperature, solved.residual, tuple(warnings), beside,
+                (float(weight @ ring_radial), float(weight @ (ring_radial + balls.centrifugal_force))),
             )
         )  # fmt: skip
     return tuple(states)
