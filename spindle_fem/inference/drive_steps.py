@@ -41,7 +41,8 @@ def centred(fine: Drive, recording: Recording) -> Drive:
     start, end = fine.start.copy(), fine.end.copy()
     for row in 1 + np.flatnonzero(np.diff(recording.times) > GAP_STEPS * usual):
         first, last = recording.times[row - 1], recording.times[row]
-        begin, stop = np.searchsorted(fine.grid, [first - 1e-6, last - 1e-6])
+        begin = np.searchsorted(fine.grid, first - 1e-6)
+        stop = np.searchsorted(fine.grid, last + 1e-6) - 1
         if stop < len(start) and stop - begin > 1:
             middle = begin + int(np.argmin(np.abs(fine.grid[begin:stop] - 0.5 * (first + last))))
             start[middle:stop, columns] = end[middle:stop, columns] = fine.start[stop, columns]
@@ -154,25 +155,23 @@ def even_drive(fast: FastModel, recording: Recording) -> Drive:
 
 
 def _amid_gaps(fine: Drive, recording: Recording) -> Drive:
-    """The drive with held inputs that are others after a gap changing amid it instead of at its end."""
+    """The drive with held inputs that are others after a gap changing amid it instead of at its end.
+
+    A gap is one step, or several where stamps jitter.
+    """
     held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
-    columns = [held.get(name, False) for name in fine.names]
-    spans = [
-        (0.5 * (first + last), int(np.searchsorted(fine.grid, last - 1e-6)))
-        for first, last in long_spacings(recording)
-    ]
-    spans = [(middle, after) for middle, after in spans if after < len(fine.start)]
+    columns = [i for i, name in enumerate(fine.names) if held.get(name, False)]
+    spans = [span for span in long_spacings(recording) if span[1] < fine.grid[-1] - 1e-6]
     if not spans:
         return fine
-    owners = np.array([after - 1 for _, after in spans])
-    first, last, after = fine.start[owners], fine.end[owners], fine.start[owners + 1]
-    # Inputs that are not held are linear over the gap.
-    middle = 0.5 * (first + last)
-    end = fine.end.copy()
-    end[owners] = np.where(columns, last, middle)
-    return replace(
-        fine,
-        grid=np.insert(fine.grid, owners + 1, [instant for instant, _ in spans]),
-        start=np.insert(fine.start, owners + 1, np.where(columns, after, middle), axis=0),
-        end=np.insert(end, owners + 1, np.where(columns, after, last), axis=0),
-    )
+    middles = np.mean(spans, axis=1)
+    owners = np.searchsorted(fine.grid, middles, side="right") - 1
+    part = ((middles - fine.grid[owners]) / fine.steps[owners])[:, None]
+    amid = fine.start[owners] + part * (fine.end[owners] - fine.start[owners])
+    grid = np.insert(fine.grid, owners + 1, middles)
+    start, end = np.insert(fine.start, owners + 1, amid, axis=0), np.insert(fine.end, owners, amid, axis=0)
+    for middle, (_, last) in zip(middles, spans, strict=True):
+        # Where stamps jitter the last one need not end a step: that in which it lies has its inputs.
+        begin, stop = np.searchsorted(grid, middle), np.searchsorted(grid, last + 1e-6) - 1
+        start[begin:stop, columns] = end[begin:stop, columns] = start[stop, columns]
+    return replace(fine, grid=grid, start=start, end=end)

@@ -54,9 +54,10 @@ unit = "W"
 STEP, GAP = 10.0, (3010.0, 3400.0)
 
 
-def run_with_gap(folder, plate=None, *, held=True, load_every=1):
+def run_with_gap(folder, plate=None, *, held=True, load_every=1, jitter=0.0):
     """A load that switches now and then; the stamps within a gap are missing, and of the load most."""
     times = np.arange(0.0, 9000.0, STEP)
+    times[1:-1] += np.random.default_rng(5).uniform(0.0, jitter, len(times) - 2).round(4)
     on = np.random.default_rng(3).exponential(200.0, 400).cumsum()
     load = 100.0 * (np.searchsorted(on, times) % 2)
     table = pd.DataFrame({"time_s": times, "plate": 20.0 if plate is None else plate, "load": load})
@@ -106,6 +107,22 @@ def test_a_held_input_that_is_another_after_a_gap_changes_amid_it(tmp_path):
     assert set(heat[(middle > GAP[0]) & (middle < amid)]) == {before}
     assert set(heat[(middle > amid) & (middle < GAP[1])]) == {after}
     assert heat.min() == 0.0
+
+
+def test_a_held_input_changes_amid_a_gap_of_jittering_stamps_too(tmp_path):
+    recording, _ = run_with_gap(tmp_path, jitter=0.5)
+    row = int(np.argmax(np.diff(recording.times)))
+    before, after = recording.inputs[row : row + 2, 0]
+    assert before != after
+    drive = even_drive(network(), recording)
+    heat = drive.start[:, drive.names.index("load")]
+    energy = np.concatenate(([0.0], np.cumsum(heat * drive.steps)))
+    first, last = recording.times[row : row + 2]
+    amid = 0.5 * (first + last)
+    parts = np.diff(np.interp([first, amid, last], drive.grid, energy))
+    np.testing.assert_allclose(parts, 0.5 * (last - first) * np.array([before, after]), atol=100.0 * STEP)
+    assert heat.min() > -1e-9
+    assert heat.max() < 100.0 + 1e-9
 
 
 def test_what_a_source_did_within_a_gap_is_within_what_is_open(tmp_path):
