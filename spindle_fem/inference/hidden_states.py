@@ -69,7 +69,8 @@ def readings_about(
         Readings that are held out as well.
     """
     predictor = problem.predictor
-    recording, grid = predictor.recordings[number], predictor.drives[number].grid
+    recording, drive = predictor.recordings[number], predictor.drives[number]
+    grid, times = drive.grid, recording.times
     rest, values = (fit.candidates, fit.values) if left_out is None else without(fit, left_out)
     kept = [i for i, c in enumerate(fit.coordinates) if c.name in values]
     coordinates = [fit.coordinates[i] for i in kept]
@@ -89,14 +90,14 @@ def readings_about(
         model = model - by @ (fit.position[kept] - mean)
         slopes = np.linalg.solve(root.T, by.reshape(-1, by.shape[2]).T).T.reshape(by.shape)
     usable = recording.usable & (True if everything else predictor.use[number][:, None])
-    owner = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), recording.times)
+    owner = np.searchsorted(0.5 * (grid[1:] + grid[:-1]), times)
     slow = [problem.slow.of(key_of(recording, channel)) for channel in range(usable.shape[1])]
     residual = np.full((len(grid), usable.shape[1]), np.nan)
     variance = np.ones_like(residual)
     for channel in range(usable.shape[1]):
         rows = np.flatnonzero(usable[:, channel])
         left = recording.temperature[rows, channel]
-        left = left - np.interp(recording.times[rows], grid, model[:, channel])
+        left = left - np.interp(times[rows], grid, model[:, channel])
         if channel >= recording.temperature_count and rows.size:
             # A displacement counts from a zero that is unknown: a coordinate beside its slopes.
             left = left - left[0]
@@ -105,6 +106,8 @@ def readings_about(
         residual[seen, channel] = np.bincount(owner[rows], left, minlength=len(grid))[seen] / count[seen]
         rounding = recording.noise[channel].resolution / np.sqrt(12.0)
         variance[seen, channel] = np.hypot(recording.sigma[channel], rounding) ** 2 / count[seen]
+    # Where a run starts anew its readings are what it starts from, as at the first point.
+    residual[list(drive.restarts)] = np.nan
     return Readings(
         residual[1:],
         variance[1:],
