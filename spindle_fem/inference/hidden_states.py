@@ -70,7 +70,7 @@ def readings_about(
     """
     predictor = problem.predictor
     recording, drive = predictor.recordings[number], predictor.drives[number]
-    grid, times = drive.grid, recording.times
+    grid, times = drive.grid, predictor.stamps(number)
     rest, values = (fit.candidates, fit.values) if left_out is None else without(fit, left_out)
     kept = [i for i, c in enumerate(fit.coordinates) if c.name in values]
     coordinates = [fit.coordinates[i] for i in kept]

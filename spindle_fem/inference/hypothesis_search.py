@@ -173,9 +173,10 @@ class Search:
         recording = predictor.recordings[0]
         predicted = predictor.predict(0, fit.values, fit.candidates).temperature
         grid = predictor.drives[0].grid
-        at_stamps = np.column_stack([np.interp(predictor.stamps(0), grid, column) for column in predicted.T])
+        times = predictor.stamps(0)
+        at_stamps = np.column_stack([np.interp(times, grid, column) for column in predicted.T])
         known = recording.usable & predictor.use[0][:, None]
-        return recording.times, np.where(known, recording.temperature - at_stamps, np.nan)
+        return times, np.where(known, recording.temperature - at_stamps, np.nan)
 
     def interval_candidates(
         self, fit: Fit, linear: LinearProblem | None = None, like: Candidate | None = None

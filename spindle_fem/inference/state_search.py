@@ -240,7 +240,7 @@ def _held_out(predictor: Predictor, number: int) -> NDArray[np.bool_]:
     """Steps of a recording in which readings are held out, (T,)."""
     grid = predictor.drives[number].grid
     middle = 0.5 * (grid[1:] + grid[:-1])
-    held = stretches(~predictor.use[number], predictor.recordings[number].times)
+    held = stretches(~predictor.use[number], predictor.stamps(number))
     return np.any([np.zeros(len(middle), bool), *((middle > a) & (middle < b) for a, b in held)], axis=0)
 
 

@@ -212,7 +212,7 @@ def _course(
     if edges[-1] < grid[-1] - 1.0:
         sizes.append(0.0)
         edges.append(float(grid[-1]))
-    read = recording.times[recording.usable.any(axis=1) & predictor.use[place.recording]]
+    read = predictor.stamps(place.recording)[recording.usable.any(axis=1) & predictor.use[place.recording]]
     spacing = float(np.median(np.diff(recording.times)))
     seen = np.histogram(read, edges)[0] * spacing > (1.0 - tuned.MOST_IN_GAPS) * np.diff(edges)
     position = 1

@@ -36,7 +36,7 @@ def unseen_moments(predictor: Predictor, fit: Fit) -> dict[str, float]:
     found: dict[str, float] = {}
     for candidate, name in _moments(fit):
         number = candidate.recording or 0
-        held = stretches(~predictor.use[number], predictor.recordings[number].times)
+        held = stretches(~predictor.use[number], predictor.stamps(number))
         misfit = _MomentMisfit(predictor, fit, fit.values | found, name)
         best = misfit.moment
         for begin, end in _beside(held, misfit.moment):
@@ -57,8 +57,8 @@ def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
     known = {c.name: c for c in fit.coordinates}
     deviation = dict(zip(known, np.sqrt(np.diag(fit.covariance)), strict=True))
     found: dict[str, float] = {}
-    for number, recording in enumerate(predictor.recordings):
-        held = stretches(~predictor.use[number], recording.times)
+    for number, use in enumerate(predictor.use):
+        held = stretches(~use, predictor.stamps(number))
         values = {
             name: fit.values[name] for name in predictor.unread_within(number, held, {}) if name in known
         }

@@ -7,13 +7,17 @@ import pytest
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.findings import at_stamps
+from spindle_fem.inference.hidden_states import readings_about
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.misdescription import EVERY_CHANNEL
 from spindle_fem.inference.misdescription_columns import misdescriptions_of, with_misdescriptions
 from spindle_fem.inference.misdescription_content import _late_already
+from spindle_fem.inference.missing_heat import stretches
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
 from spindle_fem.inference.recording_clocks import LEAST_LATE, on_clock_of_inputs, restamped
+from spindle_fem.inference.state_search import _held_out
+from spindle_fem.inference.unseen_moments import unread_changes
 from tests.support.diagnosed_spindle import TIMES, written
 
 QUIET = 0.02
@@ -80,6 +84,22 @@ def test_putting_a_clock_right_leaves_what_each_channel_is_late_in_all(case):
     assert moved.late[0] == pytest.approx(fit.values[clock] + shared)
     assert moved.late[0] + values[clock] == pytest.approx(fit.values[clock])
     assert all(values[name] == fit.values[name] for name in own)
+
+
+def test_what_looks_at_single_readings_has_them_on_the_clock_of_the_inputs(case):
+    predictor, problem = read_late(case, 90.0)
+    moved, about, fit = on_clock_of_inputs(predictor, problem, problem.fit(), predictor.misdescribed)
+    left = readings_about(about, fit, 0, everything=True).residual
+    assert np.sqrt(np.nanmean(left**2)) < 1.5 * QUIET
+    # Held-out stretches, by which moments and courses are followed, are those of the readings.
+    held = (TIMES > 4000.0) & (TIMES < 5000.0)
+    moved.use = (~held,)
+    unread, inside = [], [(float(a), float(b)) for a, b in stretches(held, moved.stamps(0))]
+    moved.unread_within = lambda number, spans, values: unread.append(spans) or {}
+    unread_changes(moved, fit)
+    assert unread == [inside]
+    middle = 0.5 * (moved.drives[0].grid[1:] + moved.drives[0].grid[:-1])
+    np.testing.assert_array_equal(_held_out(moved, 0), (middle > inside[0][0]) & (middle < inside[0][1]))
 
 
 def test_readings_are_told_on_their_own_stamps(case):
