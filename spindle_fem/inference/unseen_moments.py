@@ -144,16 +144,14 @@ class _MomentMisfit:
             ]
         except NOT_SIMULATED:
             return np.inf
-        return sum(
-            float(
-                np.sum(
-                    huber(
-                        (item.at(predicted[item.recording][:, item.channel]) - item.values) / item.bins.white
-                    )
-                )
-            )
-            for item in (*predictor.observations, *predictor.heldout)
-        )
+        left: dict[tuple[int, int, bool], list[NDArray[np.float64]]] = {}
+        for item in (*predictor.observations, *predictor.heldout):
+            own = left.setdefault((item.recording, item.channel, item.bins.is_relative), [])
+            apart = item.at(predicted[item.recording][:, item.channel]) - item.values
+            own.append(apart / item.bins.white)
+        # The constant of a displacement is free, and the same for all of its readings.
+        whole = [(np.concatenate(own), relative) for (*_, relative), own in left.items()]
+        return sum(float(np.sum(huber(own - relative * own.mean()))) for own, relative in whole)
 
     def best_within(self, begin: float, end: float) -> float:
         """The best moment between two."""

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from spindle_fem.effects.registry import candidates_for
+from spindle_fem.effects.registry import candidates_for, effect_of
 from spindle_fem.inference import full_model_check, full_model_runs, tuned
 from spindle_fem.inference.calibration import calibrate
 from spindle_fem.inference.candidate_response import BaseRun
@@ -43,6 +43,7 @@ from spindle_fem.inference.reading_noise import (
     likely_slow_error,
 )
 from spindle_fem.inference.switching_model import Chain, ReadingFilter, find_course
+from spindle_fem.inference.unseen_moments import _MomentMisfit
 from spindle_fem.machine.view.build_view import view_of
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
@@ -331,6 +332,21 @@ def test_the_zero_of_a_displacement_is_free_while_a_state_is_sought(heated):
     apart = np.abs(times[:, None] - times)
     covariance = own.sigma**2 * np.exp(-apart / own.time) + np.diag(found.variance[seen, 2]) + ZERO_SIGMA**2
     assert ours == pytest.approx(values @ np.linalg.solve(covariance, values), rel=1e-6)
+
+
+def test_a_moment_in_held_out_readings_does_not_follow_from_the_zero_of_a_displacement(heated):
+    opened = with_growth(heated[0])
+    (recording,), view = opened.recordings, opened.view
+    heat = effect_of("unrecorded_heat_source").over(view, next(iter(view.spots)), [(3000.0, 5400.0)])
+    name = next(name for name in heat.free if name.endswith("end_1"))
+    costs = []
+    for zero in (0.0, 10.0):
+        moved = replace(recording, temperature=np.add(recording.temperature, [0.0, 0.0, zero]))
+        predictor = Predictor(opened.fast, [moved], [(RUN < 4800.0) | (RUN > 6000.0)])
+        problem = Problem(predictor, known_before(predictor), EXPECTED_SLOW, predictor.observations)
+        fit = problem.fit((heat,), iterations=0)
+        costs.append(_MomentMisfit(predictor, fit, fit.values, name).cost)
+    assert costs[1] == pytest.approx(costs[0])
 
 
 def test_the_full_model_checks_displacements_in_micrometres(heated, monkeypatch):
