@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.inference.recording_gaps import long_spacings
+from spindle_fem.inference.recording_gaps import held_columns, long_spacings
 from spindle_fem.model.reduced.drive import (
     ClassWidths,
     Drive,
@@ -36,8 +36,7 @@ SETTLING, SHORT_STEP, SMALL_CHANGE = 120.0, 20.0, 0.02
 def centred(fine: Drive, recording: Recording) -> Drive:
     """The drive with changes that fell into gaps put amid them instead of at their ends."""
     usual = recording.usual_spacing
-    held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
-    columns = [i for i, name in enumerate(fine.names) if held.get(name, False)]
+    columns = held_columns(recording, fine)
     start, end = fine.start.copy(), fine.end.copy()
     for row in 1 + np.flatnonzero(np.diff(recording.times) > GAP_STEPS * usual):
         first, last = recording.times[row - 1], recording.times[row]
@@ -159,8 +158,7 @@ def _amid_gaps(fine: Drive, recording: Recording) -> Drive:
 
     A gap is one step, or several where stamps jitter.
     """
-    held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
-    columns = [i for i, name in enumerate(fine.names) if held.get(name, False)]
+    columns = held_columns(recording, fine)
     spans = [span for span in long_spacings(recording) if span[1] < fine.grid[-1] - 1e-6]
     if not spans:
         return fine

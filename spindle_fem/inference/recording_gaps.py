@@ -53,6 +53,12 @@ def long_spacings(recording: Recording) -> tuple[tuple[float, float], ...]:
     )
 
 
+def held_columns(recording: Recording, drive: Drive) -> list[int]:
+    """Columns of a drive that are inputs of its recording held from reading to reading."""
+    held = dict(zip(recording.input_names, recording.held.tolist(), strict=True))
+    return [column for column, name in enumerate(drive.names) if held.get(name, False)]
+
+
 def with_changes_amid(recording: Recording) -> Recording:
     """A recording whose rarely read held inputs change amid the readings between which they did.
 
@@ -174,9 +180,11 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
         it may have been: in a gap up to half of it either way.
     """
     usual = recording.usual_spacing
-    largest = np.ptp(drive.start, axis=0)
+    columns = held_columns(recording, drive)
+    changes = np.abs(drive.start[1:, columns] - drive.end[:-1, columns])
+    largest = np.maximum(np.ptp(drive.start[:, columns], axis=0), 1e-9)
     found = []
-    for step in 1 + np.flatnonzero(np.any(drive.start[1:] != drive.end[:-1], axis=1)):
+    for step in 1 + np.flatnonzero(np.any(changes > 0.0, axis=1)):
         time = drive.grid[step]
         row = int(np.searchsorted(recording.times, time - 1e-6))
         if not 0 < row < recording.times.size:
@@ -184,8 +192,7 @@ def unseen_jumps(recording: Recording, drive: Drive) -> tuple[tuple[int, float, 
         first, last = recording.times[row - 1], recording.times[row]
         in_gap = last - first > GAP_STEPS * usual
         if in_gap or last - first >= tuned.LEAST_SPACING:
-            change = np.abs(drive.start[step] - drive.end[step - 1]) / np.maximum(largest, 1e-9)
-            size = np.inf if in_gap else float(change.max())
+            size = np.inf if in_gap else float((changes[step - 1] / largest).max())
             found.append((size, (int(step), float(time - last), float(time - first))))
     chosen = sorted(found, key=lambda item: -item[0])[: tuned.MOST_JUMPS]
     return tuple(sorted(item for _, item in chosen))
@@ -208,10 +215,10 @@ def about_rows_amid(
     three lists of int
         Those that begin a change over several rows, that go on with it and that end it.
     """
-    usual = recording.usual_spacing
+    usual, columns = recording.usual_spacing, held_columns(recording, drive)
     goes_on = [False]
     for (first, begins, _), (second, ends, _) in itertools.pairwise(jumps):
-        changes = [drive.start[step] - drive.end[step - 1] for step in (first, second)]
+        changes = [drive.start[step, columns] - drive.end[step - 1, columns] for step in (first, second)]
         between_rows = min(begins, ends) > -1e-6
         near = between_rows and drive.grid[second] - drive.grid[first] <= GAP_STEPS * usual
         goes_on.append(bool(near and np.any(changes[0] * changes[1] > 0.0)))

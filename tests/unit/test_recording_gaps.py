@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.inference import tuned
-from spindle_fem.inference.recording_gaps import hidden_in, spread_within
+from spindle_fem.inference.recording_gaps import about_rows_amid, hidden_in, spread_within, unseen_jumps
 
 LAST = 24000.0
 
@@ -50,3 +50,21 @@ def test_windows_with_a_gap_of_their_own_and_speeds_nobody_recorded_tell_nothing
     assert spread_within(SimpleNamespace(**vars(once) | {"times": kept}), 3000.0, 3600.0) == 0.0
     unread = SimpleNamespace(times=np.arange(0.0, LAST, 60.0), input_names=(), usual_spacing=60.0)
     assert spread_within(unread, 60.0, 120.0) == 0.0
+
+
+def test_only_inputs_that_are_held_change_between_rows():
+    """Neither what was recorded beside them, means over steps, nor the rounding of straight lines."""
+    times = 60.0 * np.arange(11.0)
+    recording = SimpleNamespace(
+        times=times, input_names=("speed", "ambient"), held=np.array([True, False]), usual_spacing=60.0
+    )
+    speed, torque = np.repeat([0.0, 40.0, 100.0], [5, 1, 4]), np.arange(10.0) ** 2
+    start = np.column_stack((speed, 293.0 + np.arange(10.0), torque))
+    end = np.column_stack((speed, 294.0 + np.arange(10.0) + 1e-13, torque))
+    names = "speed", "ambient", "covariate.torque"
+    drive = SimpleNamespace(grid=times, names=names, start=start, end=end)
+    jumps = unseen_jumps(recording, drive)
+    assert jumps == ((5, 0.0, 60.0), (6, 0.0, 60.0))
+    assert about_rows_amid(recording, drive, jumps) == ([0], [], [1])
+    start[5:, 0] = end[5:, 0] = [40.0, 0.0, 0.0, 0.0, 0.0]
+    assert about_rows_amid(recording, drive, jumps) == ([], [], [])
