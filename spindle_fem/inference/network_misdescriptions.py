@@ -57,7 +57,6 @@ class MassBeside:
             behind = after
         # Beside the same mass at once, which the node's own capacity has.
         heat = capacity * (np.diff(own) - taken) / base.drive.steps
-        heat[list(restarts - {0})] = 0.0
         load = heat[:, None] * fast.model.place(self.node)
         return Change(load, load)
 

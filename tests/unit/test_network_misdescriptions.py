@@ -76,9 +76,9 @@ TIMES = np.arange(0.0, 9000.0, 10.0)
 LOAD = np.where((TIMES // 1500.0) % 2 == 0, 80.0, 20.0)
 
 
-def recorded(folder, plate, load=LOAD):
+def recorded(folder, plate, load=LOAD, times=TIMES):
     folder.mkdir(parents=True, exist_ok=True)
-    table = pd.DataFrame({"time_s": TIMES, "plate": plate, "load": load})
+    table = pd.DataFrame({"time_s": times, "plate": plate, "load": load})
     table.to_csv(folder / "run.csv", index=False)
     (folder / "run.toml").write_text(RECORDING)
     return read_recording(folder / "run.toml")
@@ -118,6 +118,19 @@ def test_a_mass_beside_is_a_second_node_that_takes_its_share(blank, predictor):
     moved = (told(blank, split + beside) - predictor.predict(0, {}).temperature[:, 0]) / share
     column = column_of(predictor, MassBeside("plate", lag))
     np.testing.assert_allclose(column, moved, atol=0.05 * np.abs(moved).max())
+
+
+def test_a_mass_beside_begins_after_a_long_gap_as_a_recording_does(tmp_path):
+    whole = np.concatenate((TIMES[:500], TIMES[:300] + 20000.0))
+    columns = [
+        column_of(
+            Predictor(network(), [recorded(tmp_path / name, 21.0, 80.0 * (times >= 20000.0), times)]),
+            MassBeside("plate", 300.0),
+        )
+        for name, times in (("whole", whole), ("second", whole[500:]))
+    ]
+    np.testing.assert_allclose(columns[0][500:], columns[1], atol=1e-9)
+    assert np.abs(columns[1][1]) > 0.02 * np.abs(columns[1]).max()
 
 
 def test_an_exponent_moves_heat_between_full_and_part_load(blank, predictor):
