@@ -55,12 +55,16 @@ def sampling_errors(network: ThermalNetwork, power: Array) -> Array:
     """
     n = network.n_nodes
     matrix = network.conductance_matrix()[:n, :n]
-    heated = np.zeros(n)
-    np.add.at(heated, network.source_node, network.source_gain**2 * power)
+    # Sources that follow one input heat together.
+    inputs = list(dict.fromkeys(network.source_input))
+    heated = np.zeros((n, len(inputs)))
+    owners = [inputs.index(name) for name in network.source_input]
+    np.add.at(heated, (network.source_node, owners), network.source_gain * np.sqrt(power))
+    heated /= network.capacity[:, None]
     # A network that nothing cools has no stationary state: the least leak gives it one.
     leak = 1e-9 * np.trace(matrix) * np.eye(n)
     state = -(matrix + leak) / network.capacity[:, None]
-    covariance = solve_continuous_lyapunov(state, -np.diag(heated / network.capacity**2))
+    covariance = solve_continuous_lyapunov(state, -heated @ heated.T)
     return np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
