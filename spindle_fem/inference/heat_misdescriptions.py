@@ -113,10 +113,14 @@ def _more(base: BaseRun, coefficients: Sequence[str], start: Array | float, end:
 
 
 def clock_change(base: BaseRun) -> Change:
-    """Temperatures stamped later than the inputs, per second: the secant over the usual shift both ways."""
+    """Temperatures stamped later than the inputs, per second: the secant over the usual shift both ways.
+
+    At either end as far as there is time.
+    """
     grid, felt, shift = base.drive.grid, base.before_sensors(), tuned.CLOCK_SIGMA
     later, earlier = (delayed(grid, felt, np.full(felt.shape[1], way * shift)).real for way in (1.0, -1.0))
-    return Change(direct=(later - earlier) / (2.0 * shift))
+    apart = np.minimum(shift, grid - grid[0]) + np.minimum(shift, grid[-1] - grid)
+    return Change(direct=(later - earlier) / apart[:, None])
 
 
 @dataclass(frozen=True, slots=True)
