@@ -35,22 +35,22 @@ class HeatWithinGap:
     Attributes
     ----------
     source : str
-    first : int
-        Step at which the course begins.
+    edges : tuple of float, [s]
+        Ends of these steps, one more than there are.
     course : tuple of float, [W]
         Mean over each step, for an amplitude of one.
     """
 
     source: str
-    first: int
+    edges: tuple[float, ...]
     course: tuple[float, ...]
 
     def __call__(self, base: BaseRun) -> Change:
-        """Loads of the heat."""
+        """Loads of the heat, in means over the steps of a run, which may be others."""
         fast = base.predictor.fast
         (row,) = fast.heat_rows(self.source)
-        heat = np.zeros(len(base.drive.steps))
-        heat[self.first : self.first + len(self.course)] = self.course
+        energy = np.append(0.0, np.cumsum(np.diff(self.edges) * self.course))
+        heat = np.diff(np.interp(base.drive.grid, self.edges, energy)) / base.drive.steps
         load = heat[:, None] * fast.model.place(fast.heat_places[row])
         return Change(load, load)
 
@@ -95,17 +95,16 @@ def unread_heat(
         Heat of every source over as many steps before the recording, from which is also seen how it varies.
     """
     network, recording = predictor.fast.network, predictor.recordings[number]
-    heat, grid, before = heat_over_steps(run), run.drive.grid, 0
+    heat, grid = heat_over_steps(run), run.drive.grid
     if earlier is not None:
-        before = len(earlier)
         heat = np.concatenate((earlier, heat))
-        grid = np.concatenate((grid[0] - recording.usual_spacing * np.arange(before, 0, -1), grid))
+        grid = np.concatenate((grid[0] - recording.usual_spacing * np.arange(len(earlier), 0, -1), grid))
     spans, changes = long_spacings(recording), recording.unseen_changes
     noise = float(np.min(recording.sigma))
     for row in _held_sources(predictor, number):
         source = network.source_names[row]
         least = LEAST_RISE * noise * float(network.capacity[network.source_node[row]])
-        for gap, order, first, size, course in _modes_in(heat[:, row], grid, spans, least):
+        for gap, order, edges, size, course in _modes_in(heat[:, row], grid, spans, least):
             yield Misdescription(
                 f"gap.{source}.{gap}.{order}",
                 f"heat of {source} within a gap",
@@ -113,11 +112,11 @@ def unread_heat(
                 size,
                 f"heat of {source} within the gap from {spans[gap][0]:.0f} s, beside what its input was "
                 f"before and after: mode {order}",
-                HeatWithinGap(source, first - before, tuple(course.tolist())),
+                HeatWithinGap(source, tuple(edges.tolist()), tuple(course.tolist())),
                 number,
             )
         own = [span for name, *span in changes if name == network.source_input[row]]
-        for begin, end, first, size, course in _changes_in(heat[:, row], grid, own, spans, least):
+        for begin, end, edges, size, course in _changes_in(heat[:, row], grid, own, spans, least):
             yield Misdescription(
                 f"change.{source}.{begin:.0f}",
                 f"instant at which heat of {source} changed",
@@ -125,7 +124,7 @@ def unread_heat(
                 size,
                 f"heat of {source} between {begin:.0f} s and {end:.0f} s, readings of its input between "
                 "which it changed, beside a change amid them",
-                HeatWithinGap(source, first - before, tuple(course.tolist())),
+                HeatWithinGap(source, tuple(edges.tolist()), tuple(course.tolist())),
                 number,
             )
 
@@ -141,8 +140,8 @@ def _changes_in(
     changes: Sequence[Sequence[float]],
     gaps: Sequence[tuple[float, float]],
     least: float,
-) -> Iterator[tuple[float, float, int, float, Array]]:
-    """Span, first step, standard deviation [W] and course of each change that may bring ``least`` J.
+) -> Iterator[tuple[float, float, Array, float, Array]]:
+    """Span, ends of steps, standard deviation [W] and course of each change that may bring ``least`` J.
 
     The instant is anywhere between the two readings with the same probability: a uniform distribution's
     spread. Gaps have courses of their own. Of an input that changes with every reading the largest.
@@ -156,14 +155,14 @@ def _changes_in(
         beside = heat[[max(own[0] - 1, 0), min(own[-1] + 1, len(heat) - 1)]]
         size = float(abs(np.diff(beside)[0])) / np.sqrt(12.0)
         if size * (end - begin) >= least:
-            found.append((begin, end, int(own[0]), size, np.ones(own.size)))
+            found.append((begin, end, grid[own[0] : own[-1] + 2], size, np.ones(own.size)))
     yield from sorted(found, key=lambda item: -item[3] * (item[1] - item[0]))[:MOST_CHANGES]
 
 
 def _modes_in(
     heat: Array, grid: Array, spans: Sequence[tuple[float, float]], least: float
-) -> Iterator[tuple[int, int, int, float, Array]]:
-    """Gap, order, first step, standard deviation [W] and course of each mode that brings ``least`` J."""
+) -> Iterator[tuple[int, int, Array, float, Array]]:
+    """Gap, order, ends of steps, standard deviation [W] and course of each mode that brings ``least`` J."""
     middle, steps = 0.5 * (grid[:-1] + grid[1:]), np.diff(grid)
     inside = [np.flatnonzero((middle > begin) & (middle < end)) for begin, end in spans]
     known = np.ones(len(heat), dtype=bool)
@@ -180,7 +179,7 @@ def _modes_in(
         for order, (size, shape) in enumerate(bridge_modes(covariance, at + 1, len(own) + 1), 1):
             course = np.interp(np.arange(len(own)), at, shape)
             if size * np.abs(np.cumsum(course * steps[own])).max() >= least:
-                yield gap, order, int(own[0]), size, course
+                yield gap, order, grid[own[0] : own[-1] + 2], size, course
 
 
 def autocovariance(values: Array, known: NDArray[np.bool_], lags: int) -> Array:

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from spindle_fem.definition.network_load import validate_network_machine
+from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.drive_steps import even_drive
 from spindle_fem.inference.gap_misdescriptions import autocovariance, bridge_modes, gap_misdescriptions
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
@@ -145,6 +146,20 @@ def test_what_a_source_did_within_a_gap_is_within_what_is_open(tmp_path):
     assert np.abs(left[seen]).max() > 0.5
     assert np.sqrt(np.mean((left - columns @ size)[seen] ** 2)) < 0.02
     assert np.all(np.abs(size) < 3.0)
+
+
+def test_heat_within_a_gap_comes_at_its_time_on_other_steps_too(tmp_path):
+    recording, _ = run_with_gap(tmp_path)
+    predictor = Predictor(network(), [recording])
+    heat = next(gap_misdescriptions(predictor)).change
+    grids, energies = [], []
+    for own in (predictor, Predictor(network(), [recording], at_stamps=True)):
+        base = BaseRun(own, 0, {})
+        grids.append(base.drive.grid)
+        energies.append(np.append(0.0, np.cumsum(heat(base).start[:, 0] * base.drive.steps)))
+    assert len(grids[0]) != len(grids[1])
+    assert np.abs(energies[1]).max() > 100.0
+    np.testing.assert_allclose(energies[1], np.interp(grids[1], grids[0], energies[0]), atol=1e-9)
 
 
 def test_nothing_is_open_without_gaps_or_where_inputs_are_not_held(tmp_path):
