@@ -112,8 +112,8 @@ def follow(
     parent = np.zeros((steps, courses), dtype=np.int32)
     chosen = np.zeros((steps, courses), dtype=np.int8)
     most = levels * courses
-    # For every course: state, mean of the nuisances, weight, likelihood, its level, its last two changes,
-    # its past.
+    # For every course: state, mean of the nuisances, weight, likelihood, its level, its last change (the step
+    # times the number of levels, and the level before it), the step of that before, its past.
     state, mean = np.zeros((most, n)), np.zeros((most, m))
     weight, likelihood = np.zeros(most), np.zeros(most)
     level, last, before = np.zeros(most, np.int8), np.zeros(most, np.int64), np.zeros(most, np.int64)
@@ -145,8 +145,8 @@ def follow(
                 c = children
                 step = log_moves[q, level[h], s]
                 next_level[c] = s
-                next_last[c] = last[h] if s == level[h] else t
-                next_before[c] = before[h] if s == level[h] else last[h]
+                next_last[c] = last[h] if s == level[h] else t * levels + level[h]
+                next_before[c] = before[h] if s == level[h] else last[h] // levels
                 for i in range(n):
                     if begins[t]:
                         next_state[c, i] = 0.0
@@ -174,7 +174,7 @@ def follow(
                 next_likelihood[c] = likelihood[h] + gained
                 origin[c] = h
                 children += 1
-        # Join those that agree on what is on and on the last two changes.
+        # Join those that agree on what is on, on the last two changes and on the level between them.
         order = np.argsort(-next_weight[:children])
         top = next_weight[order[0]]
         kept_courses = 0

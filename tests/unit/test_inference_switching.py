@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -171,3 +173,34 @@ def test_a_conductance_never_takes_more_in_a_step_than_there_is():
     assert found is None or np.isfinite(found.size + found.log_evidence)
     course = filter_.courses(answer, Chain.usual(np.zeros(STEPS, dtype=int)), np.array([1e6]), 24)
     assert not course[0].any()
+
+
+def test_no_course_at_two_levels_is_lost_that_is_likelier_than_what_is_found():
+    """Against all courses, where a sensor behind two further masses answers late."""
+    steps, sizes, sigma = 8, np.array([1.0, 2.0]), 0.05
+    advance = np.array([[[0.6, 0.2, 0.0], [0.3, 0.5, 0.2], [0.0, 0.3, 0.75]]])
+    begins, entering = np.arange(steps) == 0, np.tile([1.0, 0.0, 0.0], (steps, 1))
+    whole = np.zeros(steps, dtype=np.int64)
+    answer = LinearAnswer(
+        advance, np.zeros((1, 3, 3)), whole, entering, begins, whole, np.array([[[0.0, 0.0, 1.0]]])
+    )
+    chain = Chain(np.array([0.1]), np.array([0.2]), whole)
+    courses = np.array(list(product(range(3), repeat=steps)))
+    heat, state = np.concatenate(([0.0], sizes))[courses], np.zeros((len(courses), 3))
+    read = np.empty(heat.shape)
+    for step in range(steps):
+        state = state @ advance[0].T
+        state[:, 0] += heat[:, step]
+        read[:, step] = state[:, 2]
+    moves = chain.log_moves(2)[0]
+    prior = moves[np.hstack((np.zeros((len(courses), 1), dtype=int), courses[:, :-1])), courses].sum(axis=1)
+    true = np.flatnonzero((courses == [0, 0, 2, 2, 0, 0, 0, 0]).all(axis=1))[0]
+    slow = np.array([1e-6]), np.array([300.0])
+    for seed in range(12):
+        residual = read[true] + np.random.default_rng(seed).normal(0.0, sigma, steps)
+        variance, slopes = np.full((steps, 1), sigma**2), np.zeros((steps, 1, 0))
+        seen = Readings(residual[:, None], variance, slopes, np.full(steps, STEP), *slow)
+        level, *_ = ReadingFilter(seen).courses(answer, chain, sizes, 2000)
+        weight = prior - 0.5 * np.sum((residual - read) ** 2, axis=1) / sigma**2
+        found = np.flatnonzero((courses == level).all(axis=1))[0]
+        assert weight[found] > weight.max() - 1e-3
