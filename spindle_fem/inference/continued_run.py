@@ -90,8 +90,10 @@ def _drive_of(fast: FastModel, piece: Recording) -> Drive:
     if fast.network is None:
         drive = coarse_drive(fast.spec, piece, STEP)
     else:
+        spacing, usual = np.diff(piece.times), piece.usual_spacing
         # Within a gap rows as usual, so that heat that nobody saw may come and go in it.
-        drive = centred(fast.inputs.drive(piece, largest_step=GAP_STEPS * piece.usual_spacing), piece)
+        longest = np.max(spacing, where=spacing <= GAP_STEPS * usual, initial=usual)
+        drive = centred(fast.inputs.drive(piece, largest_step=float(longest)), piece)
     return replace(drive, times=drive.grid)
 
 

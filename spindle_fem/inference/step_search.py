@@ -339,16 +339,9 @@ def _again(place: StepPlace, problem: Problem, fit: Fit, onsets: Onsets) -> Onse
 
 
 def _at(times: Array, edge: float) -> Array:
-    """Weights of the instants that represent a step between two of them; none after the last."""
-    weights = np.zeros(len(times))
-    if edge >= times[-1] + (times[-1] - times[-2]):
-        return weights
-    place = float(np.interp(edge, times, np.arange(len(times))))
-    low = int(place)
-    weights[low] = 1.0 - (place - low)
-    if low + 1 < len(times):
-        weights[low + 1] = place - low
-    return weights
+    """Weights of the instants that represent a step at or between two of them; none at the end of all."""
+    place = float(np.interp(edge, [*times, 2.0 * times[-1] - times[-2]], np.arange(len(times) + 1)))
+    return np.maximum(0.0, 1.0 - np.abs(np.arange(len(times)) - place))
 
 
 def _candidate(

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from spindle_fem.errors import ConvergenceError
 from spindle_fem.inference import step_search
@@ -29,3 +30,12 @@ def test_a_set_that_runs_away_when_it_begins_anew_is_given_up(monkeypatch):
     monkeypatch.setattr(step_search, "slow_error_of", runs_away)
     step_search._settle(search, fit, None, onsets)
     assert kept == []
+
+
+def test_a_level_that_lasts_to_the_end_is_no_step_at_the_last_instant():
+    for end in np.linspace(1001.3, 99999.7, 40):
+        times = np.linspace(0.0, end, 121)[:-1]
+        assert np.abs(step_search._at(times, end)).max() < 1e-6
+        at = [step_search._at(times, place * end / 120.0) for place in (0.0, 50.25, 119.5)]
+        assert [weights.sum() for weights in at] == pytest.approx([1.0, 1.0, 0.5])
+        assert at[1][[50, 51]] == pytest.approx([0.75, 0.25])

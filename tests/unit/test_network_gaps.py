@@ -8,6 +8,7 @@ import pytest
 
 from spindle_fem.definition.network_load import validate_network_machine
 from spindle_fem.inference.candidate_response import BaseRun
+from spindle_fem.inference.continued_run import _drive_of
 from spindle_fem.inference.drive_steps import even_drive
 from spindle_fem.inference.gap_misdescriptions import autocovariance, bridge_modes, gap_misdescriptions
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
@@ -16,6 +17,7 @@ from spindle_fem.inference.recording_gaps import with_changes_amid
 from spindle_fem.model.lumped.written_network import build_network
 from spindle_fem.model.reduced.network_inputs import fast_network
 from spindle_fem.recordings.align import read_recording
+from spindle_fem.recordings.recording_window import piece_of
 
 MACHINE = """
 schema = "spindle-fem/machine/1"
@@ -146,6 +148,16 @@ def test_what_a_source_did_within_a_gap_is_within_what_is_open(tmp_path):
     assert np.abs(left[seen]).max() > 0.5
     assert np.sqrt(np.mean((left - columns @ size)[seen] ** 2)) < 0.02
     assert np.all(np.abs(size) < 3.0)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.4])
+def test_a_watch_follows_a_gap_in_steps_of_its_rows(tmp_path, jitter):
+    """As a diagnosis does: how heat varies from step to step is seen from its rows."""
+    recording, _ = run_with_gap(tmp_path, jitter=jitter)
+    piece = piece_of(recording, 200, 320)
+    steps = _drive_of(network(), piece).steps
+    assert len(steps) > len(piece.times) + 30
+    np.testing.assert_allclose(steps, STEP, atol=1.1 * jitter + 1e-9)
 
 
 def test_heat_within_a_gap_comes_at_its_time_on_other_steps_too(tmp_path):
