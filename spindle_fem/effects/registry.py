@@ -18,6 +18,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Candidate, Effect, IntervalEffect, Intervals, Reading
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.effects.framework.unrecorded import EDGE_WIDTH
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.registry import ADDED, entry_points, load_entry_point
 from spindle_fem.units import to_si
@@ -233,6 +234,9 @@ def definition_entry(candidate: Candidate, values: Mapping[str, float]) -> dict[
         if pairs:
             entry["intervals"] = [[f"{start:.10g} s", f"{end:.10g} s"] for start, end in pairs]
         edges = {f"{side}_{number}" for number in range(1, len(pairs) + 1) for side in ("start", "end")}
+        # A lag that is fixed is the width of edges, which long steps of a fit blur, but not a definition.
+        fixed = {o: p for o, p in candidate.parameters.items() if pairs and p.name == "lag" and not p.sigma}
+        values = dict(values) | {o: min(values.get(o, p.value), EDGE_WIDTH) for o, p in fixed.items()}
     entry["parameters"] = {
         item.name: _text(item, values.get(outer, item.value))
         for outer, item in candidate.parameters.items()

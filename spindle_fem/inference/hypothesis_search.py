@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.effects.framework.effect import Candidate, Effect, IntervalEffect, in_intervals
 from spindle_fem.effects.framework.machine_view import MachineView
+from spindle_fem.effects.framework.unrecorded import EDGE_WIDTH
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant, variants_of
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
@@ -44,6 +45,9 @@ LARGEST_SET = 3
 # Sets that are fitted together before the best of them says what is hopeless: first those that promise most,
 # then more at a time to keep all workers busy.
 FITTED_FIRST, FITTED_TOGETHER = 2, 5
+# Width of edges over the steps of a fit, from which means over steps are right to 0.3 %: the error of sums
+# over a logistic function falls with exp(-2 pi² width/step).
+BLUR = 0.3
 # Spots whose intervals are screened.
 SPOTS_SCREENED = 12
 
@@ -199,7 +203,7 @@ class Search:
                 fit,
                 [pattern for _, pattern in patterns],
                 recording,
-                number=tuned.ONSETS_OF_NETWORK if self.problem.predictor.is_network else tuned.ONSETS,
+                number=self.instants,
                 linear=linear,
                 workers=self.workers,
             )
@@ -214,7 +218,8 @@ class Search:
         found.sort(key=lambda item: -item[1].gain)
         for effect, item in found[:SPOTS_SCREENED]:
             if item.gain > 0.0:
-                candidate = effect.over(self.view, item.pattern.spot, item.intervals)
+                edges = self.edges(item.recording)
+                candidate = effect.over(self.view, item.pattern.spot, item.intervals, **edges)
                 several = len(self.problem.predictor.recordings) > 1
                 yield (
                     item,
@@ -224,6 +229,23 @@ class Search:
                         recording=item.recording if several else None,
                     ),
                 )
+
+    @property
+    def instants(self) -> int:
+        """Number of the instants at which edges of intervals and changes of level are looked for."""
+        return tuned.ONSETS_OF_NETWORK if self.problem.predictor.is_network else tuned.ONSETS
+
+    def edges(self, recording: int) -> dict[str, float]:
+        """Width of edges in a recording and distance of these instants, s, as effects take them.
+
+        Edges far sharper than a step are somewhere within it, and no fit moves them.
+        """
+        grid = self.problem.predictor.drives[recording].grid
+        width = BLUR * float(np.median(np.diff(grid)))
+        return {
+            "blurred": width if width > EDGE_WIDTH else 0.0,
+            "apart": float(grid[-1] - grid[0]) / self.instants,
+        }
 
     def patterns(self, levels: bool = False) -> list[tuple[IntervalEffect, Pattern]]:
         """Every effect of intervals at every spot that it may act at, or at which its level may change."""
@@ -276,7 +298,7 @@ class Search:
         }
         found = []
         for spot in [pattern.spot for other, pattern in self.patterns() if other.name == member.effect]:
-            here = effect.over(self.view, spot, spans)
+            here = effect.over(self.view, spot, spans, **self.edges(member.recording or 0))
             here = replace(here, reference=member.reference, recording=member.recording)
             if identity((here,)) != identity((member,)):
                 self.remember_cost(here, cost)

@@ -28,7 +28,7 @@ from spindle_fem.inference.hidden_states import (
 )
 from spindle_fem.inference.hypothesis import Hypothesis, identity
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem, amplitude_name
-from spindle_fem.inference.hypothesis_search import Search
+from spindle_fem.inference.hypothesis_search import BLUR, Search
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.missing_heat import Pattern, stretches
@@ -55,9 +55,6 @@ FEWEST = 4
 SEVERAL, ONE_SIZE = 2, 1.5
 # Rounds in which several states are inferred in turn.
 SEVERAL_ROUNDS = 2
-# Width of a state's edges over the steps of a fit, from which means over steps are right to 0.3 %: the
-# error of sums over a logistic function falls with exp(-2 pi² width/step).
-BLUR = 0.3
 # Courses side by side and rounds on the rows of a recording, ten times as many as the steps of a fit.
 ON_ROWS = (32, 3)
 # Share of the time on within which an input is zero that makes it its gate, that it exceeds chance by, and

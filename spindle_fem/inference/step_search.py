@@ -82,7 +82,7 @@ def add_steps(search: Search, fit: Fit) -> None:
             fit,
             [pattern for _, pattern in patterns],
             recording,
-            number=_instants(search),
+            number=search.instants,
             workers=search.workers,
         )
         for (effect, pattern), onsets in zip(patterns, answers, strict=True):
@@ -357,12 +357,9 @@ def _candidate(
         place.form,
         course=PULSES if alike else STEPS,
         sizes=() if alike else [level / mean for level in levels],
+        **search.edges(place.recording),
     )
     return replace(found, reference=max(mean, 1e-3), recording=place.recording if several else None)
-
-
-def _instants(search: Search) -> int:
-    return tuned.ONSETS_OF_NETWORK if search.problem.predictor.is_network else tuned.ONSETS
 
 
 def _spread(search: Search, effect: IntervalEffect, pattern: Pattern) -> float:

@@ -418,8 +418,6 @@ Intervals = Sequence[tuple[float, float]]
 class IntervalEffect(Effect):
     """An effect that is on in intervals of time, found in the data rather than searched blindly.
 
-    Its forms besides these follow laws, as those of any other effect.
-
     Attributes
     ----------
     interval_forms : tuple of str
@@ -468,6 +466,8 @@ class IntervalEffect(Effect):
         form: str | None = None,
         course: str = "pulses",
         sizes: Sequence[float] = (),
+        blurred: float = 0.0,
+        apart: float = 0.0,
     ) -> Candidate:
         """Candidate that begins from intervals, [s].
 
@@ -482,6 +482,8 @@ class IntervalEffect(Effect):
             What is free about them.
         sizes : sequence of float
             Usual size in each beside the common one.
+        blurred, apart : float, [s]
+            Least width of the edges; distance of the instants that they were sought at.
         """
 
     @abstractmethod

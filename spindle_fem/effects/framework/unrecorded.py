@@ -29,8 +29,8 @@ from spindle_fem.effects.framework.term import Term, TermContext, TermParameter
 
 # Width of the edges where the lag is short: at most, s, and as a share of the shortest interval or pause.
 EDGE_WIDTH, EDGE_SHARE = 20.0, 0.1
-# 1 σ of an edge that a search found, s, and of the factors that one interval has beside the common size: of
-# intervals of one size, and of steps that each have their own.
+# 1 σ of an edge that a search found, s, at least, and of the factors that one interval has beside the common
+# size: of intervals of one size, and of steps that each have their own.
 EDGE_SIGMA = 300.0
 JITTER, STEP_SIGMA = 0.1, 0.7
 # Form of what is less in intervals than at other times, a link or a source, and how much of it at most.
@@ -94,8 +94,8 @@ class InIntervals:
         own; ``STATES``: any number at one size or a few, edges and shares of the sizes as they are.
     sizes : sequence of float
         Usual size of every interval beside the common one; 1 where empty.
-    blurred : float, [s]
-        Least width of the edges, of a model whose steps are longer than the intervals.
+    blurred, apart : float, [s]
+        Least width of the edges, of a model with long steps; distance of the instants they were sought at.
     """
 
     n_states = 0
@@ -107,6 +107,7 @@ class InIntervals:
         course: str = PULSES,
         sizes: Sequence[float] = (),
         blurred: float = 0.0,
+        apart: float = 0.0,
     ) -> None:
         self._number = len(intervals)
         self._shared = {
@@ -132,7 +133,7 @@ class InIntervals:
             factors[0] = replace(factors[0], sigma=0.0)
         # A level that changes is another state of the machine, at once: its lag is that of the masses.
         lag = shape("lag", self._width, 0.0, "s") if course == STEPS else _lag()
-        self.parameters = (lag, *self._free_edges(intervals), *factors)
+        self.parameters = (lag, *self._free_edges(intervals, max(EDGE_SIGMA, 0.5 * apart)), *factors)
 
     def _named(self, intervals: Intervals) -> list[tuple[str, float]]:
         """Edges by name, each once."""
@@ -143,14 +144,13 @@ class InIntervals:
                 found.append((f"end_{number}", end))
         return found
 
-    def _free_edges(self, intervals: Intervals) -> list[TermParameter]:
-        """Edges that stay nearer to their own interval than to what is beside it."""
-        named = self._named(intervals)
+    def _free_edges(self, intervals: Intervals, widest: float) -> list[TermParameter]:
+        """Edges that stay nearer to their own interval than to what is beside it, 1 σ up to ``widest``."""
+        names, values = zip(*self._named(intervals), strict=True)
+        beside = [values[0] - 4.0 * widest, *values, values[-1] + 4.0 * widest]
         found = []
-        for position, (name, value) in enumerate(named):
-            before = named[position - 1][1] if position else value - 4.0 * EDGE_SIGMA
-            after = named[position + 1][1] if position + 1 < len(named) else value + 4.0 * EDGE_SIGMA
-            sigma = min(EDGE_SIGMA, max(0.45 * min(value - before, after - value), self._width))
+        for name, before, value, after in zip(names, beside, values, beside[2:], strict=False):
+            sigma = min(widest, max(0.45 * min(value - before, after - value), self._width))
             low, high = value - 0.45 * (value - before), value + 0.45 * (after - value)
             found.append(linear(name, value, sigma, "s", low=low, high=high))
         return found
@@ -382,11 +382,11 @@ class UnrecordedEffect(IntervalEffect):
         course: str = PULSES,
         sizes: Sequence[float] = (),
         blurred: float = 0.0,
+        apart: float = 0.0,
     ) -> Candidate:
         """Candidate at a spot that begins from intervals, as :class:`InIntervals` has it."""
-        chosen = self.interval_forms[0] if form is None else form
-        on = InIntervals(tuple(intervals), course, sizes, blurred)
-        return self._candidate(machine, component, on, chosen, None)
+        on = InIntervals(tuple(intervals), course, sizes, blurred, apart)
+        return self._candidate(machine, component, on, form or self.interval_forms[0], None)
 
     def likelihood_at(self, machine: MachineView, spot: str) -> float:
         """How likely it is at a spot before the data, beside the others."""
