@@ -98,12 +98,13 @@ def run_transient_study(
                 keep=add_field,
             )
             keep(prepared, result)
-            summary = summarise(prepared, result, steady)
-            replace_text(place / "transient.json", json.dumps(summary, indent=1) + "\n")
-            pages = beside.ask("write_pages", summary, result, place)
+            # kept whatever becomes of the steady state that is waited for next
             _write_table(result, place / "transient.csv")
             save_state(place / "state.npz", result.state, result.memory)
             replace_text(place / "machine.toml", write_machine(prepared.spec))
+            summary = summarise(prepared, result, steady)
+            replace_text(place / "transient.json", json.dumps(summary, indent=1) + "\n")
+            pages = beside.ask("write_pages", summary, result, place)
             pages()
         return summary
 
@@ -119,7 +120,7 @@ class _Beside:
 
         Raises
         ------
-        NoSteadyStateError
+        SpindleFemError
         """
         # what draws is loaded while the other process steps
         from spindle_fem.report import transient_report  # noqa: F401

@@ -100,6 +100,8 @@ def _report(summary: Mapping[str, Any], pictures: Sequence[Any]) -> str:
 
 def equilibrium_text(equilibrium: dict[str, Any]) -> str:
     """Approach of a transient to the steady state of its last phase, in words."""
+    if equilibrium["exists"] is None:
+        return f"The steady state of the last phase is not known: {equilibrium['reason']}"
     if not equilibrium["exists"]:
         return f"The last phase tends to no steady state: {equilibrium['reason']}"
 

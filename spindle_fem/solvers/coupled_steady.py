@@ -29,6 +29,8 @@ from spindle_fem.solvers.prepared_machine import PreparedMachine, without_expans
 FIELD_TOLERANCE = 1.0e-8
 HEAT_TOLERANCE = 1.0e-7
 COOLANT_TOLERANCE = 2.0e-9
+# W; what round-off leaves of the heat of films, and all of it where everything is equally warm.
+ROUNDED_HEAT = 1.0e-6
 MAXIMUM_ITERATIONS = 100
 # Near the fold of the reference spindle 17 are enough.
 QUICK_ITERATIONS = 25
@@ -232,7 +234,7 @@ class _Operation:
         self.heat_before = heat
         hottest = float(self.solution.temperature.max())
         return (
-            abs(heat - before) <= HEAT_TOLERANCE * max(abs(heat), 1.0e-12)
+            abs(heat - before) <= max(HEAT_TOLERANCE * abs(heat), ROUNDED_HEAT)
             and coolant_mismatch(self.machine, self.solution, self.coolant) <= COOLANT_TOLERANCE
             and circuit_mismatch(self.machine, self.solution, self.loads) <= COOLANT_TOLERANCE
             and self.solution.residual <= LINEAR_RESIDUAL_LIMIT
@@ -255,7 +257,7 @@ def coolant_mismatch(
     given = sum(solution.balance.films[surface] for surface in machine.builder.cells.surfaces)
     taken = march.enthalpy_rise - float(march.pumping_heat.sum())
     moved = float(np.abs(march.heat).sum() + np.abs(march.pumping_heat).sum())
-    return abs(given - taken) / max(moved, 1.0e-12)
+    return _relative(given - taken, moved)
 
 
 def circuit_outlets(machine: PreparedMachine, solution: ConductionSolution, loads: Loads) -> dict[str, float]:
@@ -282,8 +284,13 @@ def circuit_mismatch(machine: PreparedMachine, solution: ConductionSolution, loa
             continue
         heat = np.array([solution.balance.films[surface] for surface in film.surface])
         rise = capacity_rate(film) * (outlet - loads.inlets[name])
-        worst = max(worst, abs(float(heat.sum()) - rise) / max(float(np.abs(heat).sum()), 1.0e-12))
+        worst = max(worst, _relative(float(heat.sum()) - rise, float(np.abs(heat).sum())))
     return worst
+
+
+def _relative(left: float, moved: float) -> float:
+    """Heat that a balance leaves as a share of the heat moved, both W; none where it is round-off."""
+    return abs(left) / max(moved, ROUNDED_HEAT) if abs(left) > ROUNDED_HEAT else 0.0
 
 
 def _linear_tolerance(change: float) -> float:
@@ -301,8 +308,11 @@ def _beyond_the_fold(
 
     Just beyond a fold temperatures creep on without end: what did not converge there is a runaway too.
     Equilibria are followed with films and contacts at ambient temperature first, then with those of
-    states solved just below the speed that was reached, until that stays; the error itself where they go on.
+    states solved just below the speed that was reached, until that stays; the error itself where they go on,
+    and at standstill, where no lower speed has an equilibrium.
     """
+    if point.speed == 0.0:
+        return error
     try:
         slow = replace(point, speed=SLOW_RUNNING * point.speed)
         branch = HeatResponse(machine, slow).branch(point.speed)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from spindle_fem.errors import NoSteadyStateError
+from spindle_fem.errors import NoSteadyStateError, SpindleFemError
 from spindle_fem.model.elastic.machine_growth import NOSE
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.solvers.prepared_machine import PreparedMachine
@@ -28,7 +28,8 @@ def summarise(
     Parameters
     ----------
     steady : callable
-        Gives the probes [K] of the steady state that the last phase tends to; raises ``NoSteadyStateError``.
+        Gives the probes [K] of the steady state that the last phase tends to; raises ``NoSteadyStateError``
+        where there is none, another ``SpindleFemError`` where it cannot be worked out.
     """
     phases = []
     for phase in result.phases:
@@ -77,7 +78,8 @@ def equilibrium_of(result: StudyResult, steady: Callable[[], Mapping[str, float]
 
     ``shares_s`` are the times at which every probe had covered that share of
     its way from the start of the phase; ``bands_s`` those after which all stay
-    within so many kelvin. Both count from the start of the phase.
+    within so many kelvin. Both count from the start of the phase. ``exists`` is None, with the reason, where
+    the steady state could not be worked out.
     """
     phase = result.phases[-1]
     run = phase.transient
@@ -85,6 +87,8 @@ def equilibrium_of(result: StudyResult, steady: Callable[[], Mapping[str, float]
         probes = steady()
     except NoSteadyStateError as error:
         return {"exists": False, "reason": str(error)}
+    except SpindleFemError as error:
+        return {"exists": None, "reason": str(error)}
     final = np.array([probes[name] for name in run.probes])
     way = np.abs(final - run.readings[0])
     moved = way > 0.5
