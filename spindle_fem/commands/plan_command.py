@@ -103,16 +103,16 @@ def plan(
     """
     started = time.perf_counter()
     tell = progress or LOGGER.info
-    planned = planned_measurement(
-        machine,
-        test=test,
-        sensors=sensors,
-        inputs=inputs,
-        calibrate=calibrate,
-        overrides=overrides,
-        progress=tell,
-    )
     with output_folder(folder) as place:
+        planned = planned_measurement(
+            machine,
+            test=test,
+            sensors=sensors,
+            inputs=inputs,
+            calibrate=calibrate,
+            overrides=overrides,
+            progress=tell,
+        )
         content = plan_content(
             planned.plan,
             planned.sensors,
