@@ -25,8 +25,8 @@ def require_possible_inputs(spec: MachineSpec, recording: Recording) -> tuple[st
     Raises
     ------
     RecordingError or FaultsError
-        Every input that is unknown, a speed that is not given or no rolling bearing reaches, a flow below
-        zero; with them, every probe that is unknown.
+        Every input that is unknown, a speed that is not given or no rolling bearing reaches, a flow that
+        is not above zero; with them, every probe that is unknown.
     """
     faults = list(_faults(spec, recording))
     if faults:
@@ -70,12 +70,17 @@ def _faults(spec: MachineSpec, recording: Recording) -> Iterator[SpindleFemError
             reason,
         )
     lowest = _ends(recording, "coolant_flow")[0]
-    if lowest < 0.0:
+    if lowest < 0.0 or (lowest == 0.0 and spec.coolant is not None):
+        flows = recording.inputs[:, recording.input_names.index("coolant_flow")]
+        rows = np.flatnonzero(flows <= 0.0)
+        first = recording.stamps(recording.times[rows[:1]])[0]
+        when = first if isinstance(first, str) else f"{first:g} s"
         yield RecordingError(
             source,
-            f'column "{_column(recording, "coolant_flow")}" (coolant_flow) falls to '
-            f"{6e4 * lowest:.3g} l/min.",
-            "Allowed: 0 and above.",
+            f'column "{_column(recording, "coolant_flow")}" (coolant_flow) falls to {6e4 * lowest:.3g} l/min; '
+            f"{rows.size} of {flows.size} rows are not above 0, the first at {when}.",
+            "Allowed: above 0. While the pump is off give a small flow, such as 0.1 L/min: standing coolant "
+            "has no film model.",
         )
 
 

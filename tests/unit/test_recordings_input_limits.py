@@ -43,6 +43,15 @@ def test_a_speed_beyond_the_heat_table_is_said(spec):
     assert said.startswith("speed reaches 9000 rpm, the heat table ends at")
 
 
+def test_coolant_that_stands_is_refused_with_its_first_row(spec):
+    with pytest.raises(
+        RecordingError, match=r'"coolant_flow".* falls to 0 l/min; 1 of \d+ rows .*0\.1 L/min'
+    ):
+        require_possible_inputs(spec, recorded(spec, coolant_flow=0.0))
+    # without a channel no coolant flows anyway
+    assert require_possible_inputs(load_machine("groove_spindle"), recorded(spec, coolant_flow=0.0))
+
+
 @pytest.mark.parametrize(("name", "what"), [("ambient", "usual"), ("coolant_inlet", "range of")])
 def test_temperatures_beyond_what_is_known_are_said(spec, name, what):
     (said,) = require_possible_inputs(spec, recorded(spec, **{name: 640.0}))
