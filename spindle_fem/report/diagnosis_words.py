@@ -206,7 +206,7 @@ def _heat_words(content: Mapping[str, Any]) -> str:
     heat = mismatch["missing_heat_W"].get(component)
     unrecorded = any(item["effect"].startswith("unrecorded_") for item in content["findings"])
     if heat is None or unrecorded:
-        # An unrecorded source says itself how much; what the parameters absorb of it would confuse.
+        # An unrecorded source says itself how much.
         return ""
     mean, peak = (
         f"{abs(heat[key]):.0f} W {'more' if heat[key] >= 0.0 else 'less'}" for key in ("mean", "peak")
@@ -214,8 +214,8 @@ def _heat_words(content: Mapping[str, Any]) -> str:
     when = _when(content).rstrip()
     above_all = f", above all {when[0].lower()}{when[1:]}" if when else ""
     return (
-        f"The readings are as if {place_words(component)} gave {mean} heat than modelled in the mean of all "
-        f"time, and {peak} at the utmost{above_all}. "
+        f"Beyond what the machine's uncertain values took up, the readings are as if {place_words(component)} "
+        f"gave {mean} heat than modelled in the mean of all time, and {peak} at the utmost{above_all}. "
     )
 
 

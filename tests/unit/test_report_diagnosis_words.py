@@ -87,6 +87,10 @@ def test_missing_heat_is_told_in_the_mean_and_at_its_peak_each_with_its_sign():
     told["mismatch"]["missing_heat_W"] = {"housing": {"mean": -2.8, "peak": 28.9}}
     words = "gave 3 W less heat than modelled in the mean of all time, and 29 W more at the utmost"
     assert f"{words}. " in verdict_sentence(told)
+    # findings are larger: the parameters of the fit with nothing missing take up part of them
+    assert verdict_sentence(told).startswith(
+        "Beyond what the machine's uncertain values took up, the readings"
+    )
     told["mismatch"]["where"]["condition"] = "3000-4000 rpm"
     assert f"{words}, above all at 3000-4000 rpm. " in verdict_sentence(told)
 
