@@ -91,7 +91,7 @@ def read_measurement(path: Path) -> MeasurementTable:
         frame = _read_binary(path, name)
     except (OSError, ValueError, KeyError) as error:
         raise RecordingError(str(path), f"cannot be read ({error}).") from error
-    frame.columns = pd.Index(_distinct([str(item) for item in frame.columns]))
+    frame.columns = pd.Index([str(item) for item in frame.columns])
     return _named(path, frame, [""] * frame.shape[1], 1, [f"{path.suffix[1:].upper()} file"], [])
 
 
@@ -314,7 +314,7 @@ def _table(
         found.append(f"{word}s before the names, left out: {named[-1]}")
     if unit_rows:
         found.append(f"units in {word} {unit_rows[-1] + 1}")
-    names = _distinct([names[i] or f"column_{i + 1}" for i in range(width)])
+    names = [names[i] or f"column_{i + 1}" for i in range(width)]
     whole = rows[body:]
     long = [number for number, row in enumerate(whole) if any(row[width:])]
     if long:
@@ -349,11 +349,13 @@ def _first_of_body(rows: list[list[str]]) -> int | None:
 def _named(
     path: Path, cells: pd.DataFrame, units: list[str], first_line: int, found: list[str], unsure: list[str]
 ) -> MeasurementTable:
-    """Table with the units removed from its column names."""
+    """Table with the units removed from its column names, which are numbered where they occur again."""
     stated, names = {}, []
     for name, cell in zip(cells.columns, units, strict=False):
-        plain, inside = without_unit(name)
-        plain = unused_name(plain, names)
+        called, inside = without_unit(name)
+        plain = unused_name(called, names)
+        if plain != called:
+            unsure.append(f'several columns are called "{called}": a later one is "{plain}"')
         names.append(plain)
         unit = unit_of_text(cell) or inside
         if unit:
@@ -370,11 +372,3 @@ def unused_name(name: str, taken: Container[str]) -> str:
     """
     numbered = (f"{name}_{number}" for number in itertools.count(2))
     return name if name not in taken else next(item for item in numbered if item not in taken)
-
-
-def _distinct(names: list[str]) -> list[str]:
-    """Names with a number behind those that occur again."""
-    result: list[str] = []
-    for name in names:
-        result.append(unused_name(name, result))
-    return result

@@ -51,6 +51,16 @@ def test_german_export(tmp_path):
     assert any("Windows-1252" in text for text in drafted.unsure)
 
 
+def test_two_columns_of_one_name_both_keep_their_unit(tmp_path):
+    rows = [f"{60 * n},{warm:.2f},{warm + 1.0:.2f}" for n, warm in enumerate(WARM)]
+    drafted = draft(tmp_path, "\n".join(["time [s],SP01 [°C],SP01 [°C]", *rows]) + "\n")
+    assert [(g.channel.column, g.channel.unit) for g in drafted.channels] == [
+        ("SP01", "degC"), ("SP01_2", "degC"),
+    ]  # fmt: skip
+    assert not any("no unit" in guess.unsure for guess in drafted.channels)
+    assert any('several columns are called "SP01"' in text for text in drafted.unsure)
+
+
 def test_what_is_drafted_is_read_as_it_was(tmp_path):
     drafted = draft(tmp_path, german())
     (tmp_path / "recording.csv").write_text(data_text(drafted), encoding="utf-8")
