@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.errors import OutOfValidityError, SpecError
+from spindle_fem.errors import NoEquilibriumError, OutOfValidityError, SpecError
 from spindle_fem.operation.bearing_heat import BearingMechanics, FilmCurves
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -173,14 +173,18 @@ class FrictionMap:
         return np.exp(self.at(speed, thrust).at(film, CONDUCTANCES)[:, :, 0])
 
     def _require(self, speed: float, thrust: float) -> None:
-        for name, value, known in (("speed", speed, self.speed), ("thrust", thrust, self.thrust)):
-            lowest = 0.0 if name == "speed" else known[0]
-            slack = 1e-6 * max(known[-1], 1.0)
-            if not lowest - slack <= value <= known[-1] + slack:
+        rpm = 30.0 / np.pi
+        for name, value, lowest, highest, unit in (
+            ("speed", speed * rpm, 0.0, self.speed[-1] * rpm, "rpm"),
+            ("thrust", thrust, self.thrust[0], self.thrust[-1], "N"),
+        ):
+            slack = 1e-6 * max(highest, 1.0)
+            if not lowest - slack <= value <= highest + slack:
                 raise OutOfValidityError(
-                    f"friction map: {name}",
-                    f"{value:.6g} is outside {lowest:.6g} to {known[-1]:.6g}.",
-                    "Tabulate the friction over a range that holds it.",
+                    name,
+                    f"{value:.6g} {unit} is outside {lowest:.6g} to {highest:.6g} {unit}, for which the fast "
+                    "model has its bearings' friction.",
+                    f"Keep the {name} within, or build the model with operation.{name} or a recording out there.",
                 )
 
 
@@ -243,7 +247,7 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
     kelvin = chebyshev_nodes(*FILM_TEMPERATURES, TEMPERATURE_POINTS)
 
     def series(speed: float, thrust: float) -> Array:
-        curves = mechanics.over_film_temperature(_point(spec, speed, thrust), kelvin)
+        curves = _curves(mechanics, _point(spec, speed, thrust), kelvin)
         values = np.array([_log_quantities(curves[name], speed) for name in names])
         if speed > 0.0:
             values[:, MOMENT] -= np.log(factors)[:, None, None]
@@ -253,6 +257,19 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
     at_rest = np.array([series(0.0, thrust) for thrust in loads])
     shares = CubicSpline(loads, np.eye(len(loads))) if len(loads) > 1 else None
     return FrictionMap(names, speeds, loads, CubicSpline(np.log(speeds), turning), at_rest, shares)
+
+
+def _curves(mechanics: BearingMechanics, point: OperatingPoint, kelvin: Array) -> dict[str, FilmCurves]:
+    """Heat and contacts over film temperatures; an error says at which state there are none."""
+    try:
+        return mechanics.over_film_temperature(point, kelvin)
+    except (NoEquilibriumError, OutOfValidityError) as error:
+        low, high = kelvin[[0, -1]] - ZERO_CELSIUS_K
+        what = (
+            f"{error.what.removesuffix('.')}: the fast model needs it at {point.speed * 30.0 / np.pi:.0f} rpm, "
+            f"{point.thrust:.0f} N thrust and films of {low:.0f} to {high:.0f} °C, at the size of assembly."
+        )
+        raise type(error)(error.where, what, error.how_to_fix) from error
 
 
 def _log_quantities(curves: FilmCurves, speed: float) -> Array:

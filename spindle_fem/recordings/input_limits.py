@@ -78,7 +78,7 @@ def _faults(spec: MachineSpec, recording: Recording) -> Iterator[SpindleFemError
         yield RecordingError(
             source,
             f'column "{_column(recording, "coolant_flow")}" (coolant_flow) falls to '
-            f"{6e4 * lowest:.3g} l/min; {rows.size} of {flows.size} rows are not above 0, the first at {when}.",
+            f"{6e4 * lowest:.3g} l/min; {rows.size} of {flows.size} rows are not above 0, first at {when}.",
             "Allowed: above 0. While the pump is off give a small flow, such as 0.1 L/min: standing coolant "
             "has no film model.",
         )

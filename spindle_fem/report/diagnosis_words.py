@@ -214,8 +214,9 @@ def _heat_words(content: Mapping[str, Any]) -> str:
     when = _when(content).rstrip()
     above_all = f", above all {when[0].lower()}{when[1:]}" if when else ""
     return (
-        f"Beyond what the machine's uncertain values took up, the readings are as if "
-        f"{place_words(component)} gave {mean} heat than modelled in the mean of all time, and {peak} at the utmost{above_all}. "
+        "Beyond what the machine's uncertain values took up, the readings are as if "
+        f"{place_words(component)} gave {mean} heat than modelled in the mean of all time, "
+        f"and {peak} at the utmost{above_all}. "
     )
 
 

@@ -241,6 +241,8 @@ def test_states_that_do_not_exist() -> None:
         NoEquilibriumError, match=r"no quasi-static equilibrium at 30000 rpm: .* from about \d+ rpm on"
     ):
         solve_bearing(BEARING, turn(30_000), 500.0, control="inner")
+    with pytest.raises(NoEquilibriumError, match=r"with 500 N along the shaft and 40 N across\. .* radial"):
+        solve_bearing(BEARING, turn(30_000), ExternalLoad(500.0, 40.0), control="inner")
     low = replace(BEARING, shoulder_angle=math.radians(18.0))
     with pytest.raises(NoEquilibriumError, match=r"climbs the shoulder at 18.0° \(1[89].\d° at 3000 rpm\)"):
         solve_bearing(low, turn(3000), 1137.2, control="outer")

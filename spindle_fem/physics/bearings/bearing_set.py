@@ -156,7 +156,7 @@ def solve_states(
         kelvin = np.repeat(films, [len(row["weight"]) for row in rows])
         film = lubricant_state(lubricant, kelvin, bearing_set.composite_roughness)
     system = problems[0].system if len(problems) == 1 else side_by_side(problems)
-    solved = _solve(problems, system, speed, control, film, options)
+    solved = _solve(problems, loads, system, speed, control=control, film=film, options=options)
     bearings = bearing_set.bearings * len(problems)
     counts = [len(row["weight"]) for row in rows]
     names = [b.name for b, number in zip(bearings, counts, strict=True) for _ in range(number)]
@@ -338,8 +338,10 @@ def _require_consistent(
 
 def _solve(
     problems: Sequence[SetProblem],
+    loads: Sequence[ExternalLoad],
     system: BallSystem,
     speed: float,
+    *,
     control: RacewayControl,
     film: LubricantState | None,
     options: TractionOptions,
@@ -364,13 +366,26 @@ def _solve(
                 return near
     starts = {problem: start_displacement(problem, where) for problem in dict.fromkeys(problems)}
     start = np.concatenate([starts[problem] for problem in problems])
-    solved = solve_equilibrium(
-        system, speed, load, control, at_rest=(start, ball_load), lubricant=film, options=options,
-        where=where,
-    )  # fmt: skip
+    try:
+        solved = solve_equilibrium(
+            system, speed, load, control, at_rest=(start, ball_load), lubricant=film, options=options,
+            where=where,
+        )  # fmt: skip
+    except NoEquilibriumError as error:
+        # Loads that are not all one stand side by side only behind the one that is asked for.
+        raise _under(error, loads[0]) from error
     if recent is not None:
         recent[key] = speed, solved
     return solved
+
+
+def _under(error: NoEquilibriumError, load: ExternalLoad) -> NoEquilibriumError:
+    """The error of balls that find no place, with the load that the set is under."""
+    radial = abs(load.radial)
+    across = f" and {radial:.0f} N across" if radial else ""
+    what = f"{error.what.removesuffix('.')}, with {load.thrust:.0f} N along the shaft{across}."
+    less = " Or less radial load." if radial and "radial" not in error.how_to_fix else ""
+    return NoEquilibriumError(error.where, what, f"{error.how_to_fix}{less}")
 
 
 __all__ = [
