@@ -184,7 +184,8 @@ class FrictionMap:
                     name,
                     f"{value:.6g} {unit} is outside {lowest:.6g} to {highest:.6g} {unit}, for which the fast "
                     "model has its bearings' friction.",
-                    f"Keep the {name} within, or build the model with operation.{name} or a recording out there.",
+                    f"Keep the {name} within, or build the model with a definition (operation.{name}) or a "
+                    "recording that reaches there.",
                 )
 
 
@@ -264,10 +265,11 @@ def _curves(mechanics: BearingMechanics, point: OperatingPoint, kelvin: Array) -
     try:
         return mechanics.over_film_temperature(point, kelvin)
     except (NoEquilibriumError, OutOfValidityError) as error:
-        low, high = kelvin[[0, -1]] - ZERO_CELSIUS_K
+        low, high = (end - ZERO_CELSIUS_K for end in FILM_TEMPERATURES)
         what = (
-            f"{error.what.removesuffix('.')}: the fast model needs it at {point.speed * 30.0 / np.pi:.0f} rpm, "
-            f"{point.thrust:.0f} N thrust and films of {low:.0f} to {high:.0f} °C, at the size of assembly."
+            f"{error.what.removesuffix('.')}. The fast model needs the friction at "
+            f"{point.speed * 30.0 / np.pi:.0f} rpm, {point.thrust:.0f} N of thrust and films of {low:.0f} to "
+            f"{high:.0f} °C, at the size of assembly."
         )
         raise type(error)(error.where, what, error.how_to_fix) from error
 

@@ -9,12 +9,13 @@ from scipy.interpolate import CubicSpline
 
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.framework.term import TermContext
-from spindle_fem.errors import OutOfValidityError, SpecError
+from spindle_fem.errors import NoEquilibriumError, OutOfValidityError, SpecError
 from spindle_fem.model.reduced.drive import with_walls
 from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tabulated_machine
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.bearing_heat import BearingMechanics, heat_of_table
+from spindle_fem.operation.bearing_heat import BearingMechanics
 from spindle_fem.operation.friction_map import CONDUCTANCES, MOMENT, tabulate_friction, thrusts_between
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.units import Uncertain
@@ -169,10 +170,20 @@ def test_what_no_map_can_hold_is_refused(spec, friction):
     ):
         tabulate_friction(follows, 400.0, THRUSTS)
     film = np.full(len(friction.bearings), 300.0)
-    with pytest.raises(OutOfValidityError, match=r"friction map: speed: 600 is outside 0 to 471"):
+    with pytest.raises(OutOfValidityError, match=r"speed: 5729.58 rpm is outside 0 to 4500 rpm"):
         friction.heat(600.0, 1750.0, film)
-    with pytest.raises(OutOfValidityError, match=r"friction map: thrust: 100 is outside 875 to 1750"):
+    with pytest.raises(OutOfValidityError, match=r"thrust: 100 N is outside 875 to 1750 N.* recording"):
         friction.heat(300.0, 100.0, film)
+
+
+def test_bearings_that_cannot_be_tabulated_are_refused_with_their_state(spec, monkeypatch):
+    def refuse(self, point, kelvin):
+        raise NoEquilibriumError("F1", "gross sliding.", "Raise preload.")
+
+    monkeypatch.setattr(BearingMechanics, "over_film_temperature", refuse)
+    words = r"gross sliding\. .* at 4 rpm, 875 N of thrust and films of 5 to 95 °C, at the size of assembly"
+    with pytest.raises(NoEquilibriumError, match=words):
+        tabulate_friction(spec, 4500.0 * RPM, THRUSTS)
 
 
 @pytest.mark.parametrize(
