@@ -15,7 +15,6 @@ from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tab
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.bearing_heat import BearingMechanics, heat_of_table
-from spindle_fem.operation.bearing_heat import BearingMechanics
 from spindle_fem.operation.friction_map import CONDUCTANCES, MOMENT, tabulate_friction, thrusts_between
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.units import Uncertain
