@@ -61,6 +61,8 @@ def _number(value: Any, digits: int) -> str:
 
 def print_run(summary: dict[str, Any], folder: Path) -> None:
     """Headline of a run: temperatures, bearings, balance, checks and warnings."""
+    from spindle_fem.report.run_tables import warmest_at
+
     console = open_console()
     table = headed_table(
         *("Bearings", "", "heat W", "inner °C", "outer °C", "balls °C", "difference K"),
@@ -100,7 +102,7 @@ def print_run(summary: dict[str, Any], folder: Path) -> None:
             f"{circuit['regime']}, film {circuit['film_coefficient_W_m2K']:.0f} W/(m²·K)"
         )
     temperature, energy, mesh = summary["temperature"], summary["energy"], summary["mesh"]
-    console.print(f"Hottest {temperature['max_degC']:.2f} °C at {temperature['max_at_mm']} mm")
+    console.print(f"Hottest {temperature['max_degC']:.2f} °C in the solid at {warmest_at(summary)}")
     console.print(
         f"Heat in {energy['heat_in_W']:.2f} W, imbalance {energy['imbalance_relative']:.1e}; "
         f"{mesh['nodes']:,} temperatures, {mesh['elements']:,} elements, "
@@ -194,6 +196,8 @@ _HEAT_ROWS = (
 
 def print_heat(content: dict[str, Any], folder: Path | None) -> None:
     """Heat term by term, one table a bearing, one column a speed; where the report is, if there is one."""
+    from spindle_fem.report.heat_report import heat_conditions
+
     console = open_console()
     for name, rows in content["bearings"].items():
         table = headed_table(
@@ -210,6 +214,7 @@ def print_heat(content: dict[str, Any], folder: Path | None) -> None:
             values = [row["heat_W"][level][name] for row in content["models"]]
             table.add_row(f"by {level} W", *(_number(value, 1) for value in values), style="dim")
         console.print(table)
+    console.print(f"At {heat_conditions(content)}")
     _print_warnings(console, content)
     if folder is not None:
         console.print(f"Report: {folder / 'report.html'}")

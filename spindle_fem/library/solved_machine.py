@@ -65,9 +65,20 @@ class SolvedMachine(ThermalResult):
         """Heat of every bearing, term by term; None without bearings."""
         return draw_charts(self)["heat_by_bearing"]()
 
-    def plot_coolant(self) -> Figure | None:
-        """Coolant, wall and film along the channel; None without one."""
-        return draw_charts(self)["coolant"]()
+    def plot_coolant(self) -> Figure:
+        """Coolant, wall and film along the channel.
+
+        Raises
+        ------
+        SpecError
+            There is no channel: a circuit has one film and one outlet, and nothing along it.
+        """
+        drawn = draw_charts(self)["coolant"]()
+        if drawn is None:
+            streams = f"; circuits has {', '.join(self.circuits)}" if self.circuits else ""
+            what = f"has no [channel] along which to draw its coolant{streams}."
+            raise SpecError(self.spec.name, what, "Use plot_heat_balance for what coolant carries off.")
+        return drawn
 
     def plot_growth(self) -> Figure | None:
         """Shaft, rings and housing displaced by growth, exaggerated; None without bearings on bodies."""

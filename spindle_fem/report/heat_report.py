@@ -48,7 +48,7 @@ def _page(content: Mapping[str, Any], figures: Path) -> str:
         places = ((figures / f"{name}.png", HEAT_CAPTIONS[name]) for name in names)
         return [illustration_of(path, caption) for path, caption in places if path.is_file()]
 
-    bearings, warmed = content["bearings"], content["temperature_degC"]
+    bearings = content["bearings"]
     terms = [_bearing_table(name, rows) for name, rows in bearings.items()]
     models = [_model_table(name, content["models"]) for name in bearings]
     mechanics = [name for name in HEAT_CAPTIONS if name not in ("heat_terms", "heat_models")]
@@ -58,10 +58,24 @@ def _page(content: Mapping[str, Any], figures: Path) -> str:
         Section("models", "Heat by every model", [*drawn("heat_models"), Text(_MODELS), *models]),
         Section("mechanics", "Contacts, films and speeds", drawn(*mechanics)),
     ]
-    at = "the solved temperatures of each speed" if warmed is None else f"{number(warmed)} °C"
     return render_document(
-        "Bearing heat", content["machine"], sections, f"Heat model “{content['model']}” at {at}."
+        "Bearing heat",
+        content["machine"],
+        sections,
+        f"Heat model “{content['model']}” at {heat_conditions(content)}.",
     )
+
+
+def heat_conditions(content: Mapping[str, Any]) -> str:
+    """At which temperature, and with bearings of which size, the heat is.
+
+    >>> heat_conditions({"temperature_degC": 40.0})
+    '40.0 °C of films, rings and balls, and the size of assembly'
+    """
+    warmed = content["temperature_degC"]
+    if warmed is None:
+        return "the solved temperatures of each speed"
+    return f"{number(warmed)} °C of films, rings and balls, and the size of assembly"
 
 
 def _cards(content: Mapping[str, Any]) -> list[dict[str, str]]:

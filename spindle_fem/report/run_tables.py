@@ -73,16 +73,20 @@ def heat_by_sink(heat_out: Mapping[str, float], circuits: Iterable[str]) -> dict
     return dict(sorted(totals.items(), key=lambda item: -item[1]))
 
 
+def warmest_at(summary: Mapping[str, Any]) -> str:
+    """Where the solid is warmest, in words.
+
+    >>> warmest_at({"temperature": {"max_at_mm": [0.0, 30.0, 12.0]}})
+    'r = 30 mm, z = 12 mm'
+    """
+    x, y, z = summary["temperature"]["max_at_mm"]
+    return f"r = {math.hypot(x, y):.0f} mm, z = {z:.0f} mm"
+
+
 def headline(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     """Cards with the numbers that a designer looks for first."""
     temperature, energy = summary["temperature"], summary["energy"]
-    x, y, z = temperature["max_at_mm"]
-    items = [
-        (
-            f"{number(temperature['max_degC'])} °C",
-            f"warmest place of the solid, r = {math.hypot(x, y):.0f} mm, z = {z:.0f} mm",
-        ),
-    ]
+    items = [(f"{number(temperature['max_degC'])} °C", f"warmest place of the solid, {warmest_at(summary)}")]
     bearings = summary["bearings"]
     if bearings:
         ball = max(bearings, key=lambda name: _or_low(bearings[name]["temperature_ball_degC"]))

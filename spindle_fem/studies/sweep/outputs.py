@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from typing import Any
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.schema import split_name
-from spindle_fem.errors import SpecError, UnknownKeyError, did_you_mean
+from spindle_fem.errors import SpecError, UnknownKeyError
 from spindle_fem.machine.view.part_roles import Layout
 from spindle_fem.model.elastic.machine_bodies import carries_rings
 from spindle_fem.units import ZERO_CELSIUS_K, to_si
@@ -171,7 +172,9 @@ def output_fault(path: str, spec: MachineSpec, where: str) -> UnknownKeyError | 
         stem = f"bearings.{bearing.name}.terms_W."
         if path.startswith(stem) and path != stem and "." not in path[len(stem) :]:
             return None
-    return UnknownKeyError(where, f'there is no output "{path}".', did_you_mean(path, allowed))
+    near = difflib.get_close_matches(path, allowed, n=4, cutoff=0.0)
+    fix = f"Nearest: {', '.join(near)}; see docs/design_studies.md."
+    return UnknownKeyError(where, f'there is no output "{path}".', fix)
 
 
 def unit_of(path: str) -> OutputUnit:
