@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from spindle_fem.definition.displacement_tables import FRAME, DisplacementSensor, MountSpot, SensorSpot
+from spindle_fem.definition.housing_flange import flange_of, housing_of
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.errors import SpecError, SpindleFemError, did_you_mean
 
@@ -81,10 +82,13 @@ def _mount(spec: MachineSpec, sensor: DisplacementSensor) -> Iterator[SpindleFem
     standing = [part for part in spec.part if not part.rotating]
     segments = [segment.name for part in standing for segment in part.segment if segment.name]
     parts = {part.name for part in standing}
-    allowed = [FRAME, *segments, *(surface.name for surface in spec.surface if surface.part in parts)]
-    if sensor.mount not in allowed:
+    surfaces = [surface.name for surface in spec.surface if surface.part in parts]
+    if sensor.mount not in (FRAME, *segments, *surfaces):
+        flange = flange_of(housing_of(spec.part))
+        none = "" if flange else "; the housing has no flange, so neither a segment nor a frame holds it"
+        allowed = did_you_mean(sensor.mount, [*([flange, FRAME] if flange else []), *surfaces])
         yield SpecError(
             where,
-            f'"{sensor.mount}" is no segment or surface of a standing part.',
-            did_you_mean(sensor.mount, allowed),
+            f'"{sensor.mount}" is no segment or surface of a standing part{none}.',
+            f"{allowed} Or z and radius of a spot on a standing part.",
         )

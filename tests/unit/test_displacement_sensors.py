@@ -238,6 +238,18 @@ def test_a_mount_that_is_no_flange_is_refused(grown, tmp_path) -> None:
         GrowthModel(spec, grown[1], 1)
 
 
+def test_without_a_flange_only_what_can_hold_a_sensor_is_offered(tmp_path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(
+        'schema = "spindle-fem/machine/1"\nbase = "router_spindle"\nname = "own"\n'
+        'displacement_sensor = [{name = "nose", at = {z = "0 mm", radius = "15 mm"}, direction = "axial"}]\n',
+        encoding="utf-8",
+    )
+    with pytest.raises(FaultsError, match=r"1 fault\n.*neither a segment nor a frame.* Or z and") as told:
+        check_machine(file)
+    assert "frame" not in str(told.value).partition("Allowed:")[2]
+
+
 def test_check_finds_a_sensor_on_a_flange_that_is_none(tmp_path) -> None:
     file = tmp_path / "own.toml"
     file.write_text(

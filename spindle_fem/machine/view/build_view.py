@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.circuit_tables import CircuitFilm
+from spindle_fem.definition.housing_flange import segment_volume, volume
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.stream_films import StreamFilm
 from spindle_fem.definition.uncertain_parameters import uncertain_parameters
@@ -22,8 +23,6 @@ from spindle_fem.machine.view.part_roles import (
     SHAFT_GAP,
     STANDING_GAP,
     Layout,
-    segment_volume,
-    volume,
 )
 from spindle_fem.machine.view.place_names import ACROSS, AROUND, NEAR, UP, ringed_probes
 from spindle_fem.machine.view.usual_sizes import (

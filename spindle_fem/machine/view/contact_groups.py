@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from spindle_fem.definition.housing_flange import volume
 from spindle_fem.definition.machine_spec import NaturalFilm
 from spindle_fem.effects.framework.machine_view import Seat
 from spindle_fem.machine.view.machine_names import MachineNames
-from spindle_fem.machine.view.part_roles import Layout, volume
+from spindle_fem.machine.view.part_roles import Layout
 
 
 def seats_of(

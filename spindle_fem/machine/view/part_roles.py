@@ -8,11 +8,10 @@ import numpy as np
 
 from spindle_fem.definition.displacement_tables import FRAME
 from spindle_fem.definition.exchange_tables import Gap
+from spindle_fem.definition.housing_flange import FLANGE_STEP, flange_of, housing_of, segment_volume, volume
 from spindle_fem.definition.machine_spec import AnnulusSegment, MachineSpec, Part, Probe, Surface
 from spindle_fem.errors import SpecError, raise_all
 
-# A segment is a flange where its diameter passes the next largest by this share.
-FLANGE_STEP = 1.1
 # Spot of the wall of the cooling channel.
 CHANNEL_WALL = "channel_wall"
 # Spot of the shaft between its bearings: a rotor, a drawbar, what runs through the bore.
@@ -35,18 +34,13 @@ class Layout:
         ends = [z for _, bearing in spec.bearings for z in bearing.z]
         self.first, self.last = (min(ends), max(ends)) if ends else (0.0, 0.0)
         rotating = [part for part in spec.part if part.rotating]
-        standing = [part for part in spec.part if not part.rotating]
         self.shaft = max(rotating, key=volume, default=None)
-        self.housing = max(standing, key=volume, default=None)
+        self.housing = housing_of(spec.part)
         self.flange = self._flange()
 
     def _flange(self) -> str:
-        """Widest segment of the housing; empty if none is clearly wider than the others."""
-        if self.housing is None or len(self.housing.segment) < 2:
-            return ""
-        wide = sorted(self.housing.segment, key=lambda s: s.outer_diameter)
-        stands_out = wide[-1].outer_diameter > FLANGE_STEP * wide[-2].outer_diameter
-        return wide[-1].name if stands_out else ""
+        """Segment of the housing that is its flange; empty without one."""
+        return flange_of(self.housing)
 
     def flange_ends(self) -> tuple[float, float] | None:
         """Both ends of the flange along the axis."""
@@ -197,17 +191,6 @@ def extent(part: Part) -> tuple[float, float]:
     return min(s.z[0] for s in part.segment), max(s.z[1] for s in part.segment)
 
 
-def volume(part: Part) -> float:
-    """Volume of a part's segments, m³; fused overlaps count twice."""
-    return sum(segment_volume(s) for s in part.segment)
-
-
-def segment_volume(segment: AnnulusSegment) -> float:
-    """Volume of an annulus, m³."""
-    area = 0.25 * np.pi * (segment.outer_diameter**2 - segment.inner_diameter**2)
-    return float(area * (segment.z[1] - segment.z[0]))
-
-
 def require_mounts(layout: Layout) -> None:
     """Refuse displacement sensors on a flange where there is none, or on a segment that is no flange.
 
@@ -216,8 +199,10 @@ def require_mounts(layout: Layout) -> None:
     SpecError or FaultsError
     """
     surfaces, faults = {surface.name for surface in layout.spec.surface}, []
+    segments = {s.name for part in layout.spec.part for s in part.segment}
     for sensor in layout.spec.displacement_sensor:
-        if not isinstance(sensor.mount, str) or sensor.mount in surfaces:
+        # names that are nothing are refused as the definition is read
+        if not isinstance(sensor.mount, str) or sensor.mount not in {FRAME, *segments} - surfaces:
             continue
         if not layout.flange or sensor.mount not in (layout.flange, FRAME):
             named = f"{layout.flange}, {FRAME}, " if layout.flange else ""
