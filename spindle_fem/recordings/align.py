@@ -16,6 +16,7 @@ from spindle_fem.recordings.channel_checks import (
     Flag,
     channel_noise,
     longest_run,
+    never_changes,
     resolution,
     stale_readings,
     temperature_flags,
@@ -403,6 +404,7 @@ def _channel_defects(
         bridged=int(np.count_nonzero(marked)) if channel.role == "input" else 0,
         noise=noise,
         sigma_declared=channel.sigma,
+        never_changes=never_changes(values),
     )
 
 

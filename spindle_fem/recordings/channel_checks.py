@@ -37,6 +37,7 @@ SPIKE_EDGE_FACTOR = 4.0
 DROPOUT_SIGMAS = 12.0
 DROPOUT_FLOOR = 3.0
 DROPOUT_LONGEST = 200
+STUCK_JUDGED = 50
 STUCK_CHANCE = 1.0e-9
 STUCK_MOST_EQUAL = 0.6
 STALE_READINGS = 60
@@ -300,7 +301,7 @@ def _dropouts(values: Array, noise: float) -> NDArray[np.bool_]:
 def _stuck(values: Array) -> NDArray[np.bool_]:
     """Runs of one value so long that chance repeats do not explain them."""
     stuck = np.zeros(values.size, dtype=bool)
-    if values.size < 50:
+    if values.size < STUCK_JUDGED:
         return stuck
     equal = np.diff(values) == 0.0
     chance = float(equal.mean())
@@ -313,6 +314,16 @@ def _stuck(values: Array) -> NDArray[np.bool_]:
             # the first reading of the run is a true one
             stuck[begin + 1 : end + 1] = True
     return stuck
+
+
+def never_changes(values: Array) -> bool:
+    """Whether a channel has many readings, NaN where missing, and all of them are one value.
+
+    >>> never_changes(np.full(60, 296.35)), never_changes(np.append(np.full(60, 296.35), 296.4))
+    (True, False)
+    """
+    present = values[np.isfinite(values)]
+    return present.size >= STUCK_JUDGED and float(np.ptp(present)) == 0.0
 
 
 def stale_readings(

@@ -33,6 +33,8 @@ class ChannelDefects:
         Grid points of an input that its neighbours' readings fill by ``hold``.
     noise : ChannelNoise
         Measured, SI.
+    never_changes : bool
+        All of many readings are one value.
     """
 
     column: str
@@ -48,6 +50,7 @@ class ChannelDefects:
     bridged: int
     noise: ChannelNoise
     sigma_declared: float | None
+    never_changes: bool = False
 
     def counts(self) -> dict[str, int]:
         """Defect counts that are not zero, by name."""
@@ -124,6 +127,12 @@ class DefectReport:
         """Defects of one column."""
         return next(item for item in self.channels if item.column == column)
 
+    def silent(self) -> list[str]:
+        """Temperature columns that never change while others do."""
+        read = [item for item in self.channels if item.role == "temperature" and item.readings]
+        same = [item.column for item in read if item.never_changes]
+        return same if len(same) < len(read) else []
+
     def lines(self) -> list[str]:
         """The report as lines of text."""
         text = [
@@ -156,8 +165,11 @@ class DefectReport:
             )
         if self.unused_columns:
             text.append("columns not in the manifest: " + ", ".join(self.unused_columns))
+        silent = self.silent()
         for item in self.channels:
-            counts = ", ".join(f"{number} {name.replace('_', ' ')}" for name, number in item.counts().items())
+            found = [f"{number} {name.replace('_', ' ')}" for name, number in item.counts().items()]
+            found += ["never changes while other sensors do"] if item.column in silent else []
+            counts = ", ".join(found)
             noise = ""
             if item.role == "temperature":
                 noise = f"; noise {item.noise.white:.3g} K"
@@ -171,6 +183,7 @@ class DefectReport:
     def to_json(self) -> dict[str, Any]:
         """Plain data; what could not be measured is null."""
         content: dict[str, Any] = {name: getattr(self, name) for name in _PLAIN}
+        silent = self.silent()
         content["gaps"] = [{"start_s": gap.start, "end_s": gap.end} for gap in self.gaps]
         content["unused_columns"] = list(self.unused_columns)
         content["thinned"] = None if self.thinned is None else asdict(self.thinned)
@@ -181,6 +194,7 @@ class DefectReport:
                 "readings": item.readings,
                 "longest_missing_s": item.longest_missing_s,
                 **item.counts(),
+                **({"never_changes": True} if item.column in silent else {}),
                 "noise": _finite(item.noise.white),
                 "slow_error": _finite(item.noise.slow),
                 "resolution": item.noise.resolution,

@@ -1,5 +1,7 @@
 """Disorder, repeats, spikes, drop-outs, stuck sensors, gaps, holds, noise: found and counted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -268,6 +270,20 @@ def test_slow_error_beside_white_noise():
     quiet = 0.1 * random.standard_normal(times.size)
     assert slow_error(times, quiet + slow, 0.1) == pytest.approx(0.05, rel=0.5)
     assert slow_error(times, quiet, 0.1) < 0.01
+
+
+def test_a_sensor_that_reads_one_value_beside_others_that_change_is_told(tmp_path):
+    times, values = signal()
+    same = read(tmp_path, [(t, 23.2, 20.0, 0.0) for t in times]).defects
+    (column,) = (item.column for item in same.channels if item.role == "temperature")
+    assert not same.silent()  # a machine at rest, as far as this says
+    moving = replace(same.channel(column), column="other", never_changes=False)
+    beside = replace(same, channels=(*same.channels, moving))
+    assert any(line.startswith(f"{column}: never changes while") for line in beside.lines())
+    plain = {item["channel"]: item.get("never_changes") for item in beside.to_json()["channels"]}
+    assert (plain[column], plain["other"]) == (True, None)
+    changing = read(tmp_path, [(t, float(v), 20.0, 0.0) for t, v in zip(times, values, strict=True)])
+    assert not changing.defects.channel(column).never_changes
 
 
 def test_report_as_text_and_plain_data(tmp_path):
