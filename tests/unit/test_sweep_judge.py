@@ -137,7 +137,7 @@ def test_outputs_of_a_machine_and_their_units():
     assert {"bearings.B1.ring_difference_K", "probes.B1_SEAT", "derived.cooler_heat_W"} <= set(paths)
     assert output_fault("bearings.B1.terms_W.cage", spec, "here") is None
     unknown = str(output_fault("bearings.B1.ring_diference_K", spec, "here"))
-    assert "Nearest: bearings.B1.ring_difference_K, " in unknown
+    assert 'Did you mean "bearings.B1.ring_difference_K"? Also near: ' in unknown
     assert len(unknown) < 300
     assert not any(path.startswith("coolant") for path in output_paths(load_machine("uncooled")))
     assert unit_of("coolant.film_coefficient_W_m2K.low").text == "W/(m²·K)"

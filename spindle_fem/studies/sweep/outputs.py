@@ -172,8 +172,8 @@ def output_fault(path: str, spec: MachineSpec, where: str) -> UnknownKeyError | 
         stem = f"bearings.{bearing.name}.terms_W."
         if path.startswith(stem) and path != stem and "." not in path[len(stem) :]:
             return None
-    near = difflib.get_close_matches(path, allowed, n=4, cutoff=0.0)
-    fix = f"Nearest: {', '.join(near)}; see docs/design_studies.md."
+    near, *others = difflib.get_close_matches(path, allowed, n=4, cutoff=0.0)
+    fix = f'Did you mean "{near}"? Also near: {", ".join(others)}; see docs/design_studies.md.'
     return UnknownKeyError(where, f'there is no output "{path}".', fix)
 
 
