@@ -20,7 +20,13 @@ from spindle_fem.inference.input_sampling import sampled_errors
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.misdescription_columns import with_misdescriptions
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.reading_noise import ChannelBins, SlowError, likely_slow_error, slow_errors_of
+from spindle_fem.inference.reading_noise import (
+    Absorbed,
+    ChannelBins,
+    SlowError,
+    likely_slow_error,
+    slow_errors_of,
+)
 from spindle_fem.inference.recording_clocks import restamped
 from spindle_fem.inference.recording_gaps import about_rows_amid
 from spindle_fem.inference.robust_size import huber
@@ -157,7 +163,24 @@ def expected_slow_error(predictor: Predictor) -> SlowError:
 
 def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
     """Most probable slow error of what a fit leaves."""
-    return likely_slow_error(problem.binned_residuals(fit), **_slow_choices(problem.predictor))
+    return likely_slow_error(
+        problem.binned_residuals(fit), **_slow_choices(problem.predictor), absorbed=_absorbed(problem, fit)
+    )
+
+
+def _absorbed(problem: Problem, fit: Fit) -> Absorbed | None:
+    """What the coordinates of a fit take up of slow errors; None for a network: its channels have their own.
+
+    A machine that is drawn has a hundred, which follow an error of hours in part.
+    """
+    if problem.predictor.is_network:
+        return None
+    predicted = problem.predict(fit.candidates, fit.coordinates, fit.position)
+    root = np.eye(len(fit.coordinates))
+    number = len(problem.belief.coordinates)
+    root[:number, :number] = problem.belief.root
+    warm = [item for item in problem.observations if not item.bins.is_relative]
+    return Absorbed([item.at(predicted[item.recording].sensitivity[:, item.channel]) for item in warm], root)
 
 
 def with_inexact_laws(problem: Problem, fit: Fit) -> Problem:
@@ -208,6 +231,8 @@ def with_own_noise(
     """
     choices = _slow_choices(plain.predictor)
     fits = [item.fit for item in hypotheses]
+    nothing = next(fit for fit in fits if not fit.candidates)
+    choices["absorbed"] = _absorbed(plain, nothing)
     for index, fit in enumerate(fits):
         # Nothing missing is fitted anew: what the others explain it must take for error.
         slow = plain.slow if fit.candidates else likely_slow_error(residuals(fit), **choices)

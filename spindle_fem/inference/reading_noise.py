@@ -256,6 +256,30 @@ def whiten(factor: Array, values: Array) -> Array:
     return solve_triangular(factor, values, lower=True, check_finite=False)
 
 
+@dataclass(frozen=True, slots=True)
+class Absorbed:
+    """What a fit's coordinates can take up of an error.
+
+    Attributes
+    ----------
+    columns : sequence of (b, p) ndarray, [K]
+        Derivatives of the bin means by the coordinates, one for each observation of a temperature.
+    root : (p, p) ndarray
+        Root of their prior's precision.
+    """
+
+    columns: Sequence[Array]
+    root: Array
+
+    def log_determinant(self, whiteners: Sequence[Whitener]) -> float:
+        """Logarithm of the determinant of the coordinates' precision after these observations."""
+        precision = self.root.T @ self.root
+        for whitener, columns in zip(whiteners, self.columns, strict=True):
+            white = whitener(columns)
+            precision += white.T @ white
+        return float(np.linalg.slogdet(precision)[1])
+
+
 def likely_slow_error(
     residuals: Sequence[tuple[ChannelBins, Array]],
     *,
@@ -264,6 +288,7 @@ def likely_slow_error(
     sigmas: Sequence[float] = (0.01, 0.02, 0.035, 0.05, 0.075, 0.11, 0.17, 0.25, 0.4, 0.65, 1.0, 1.6, 2.5),
     times: Sequence[float] = (600.0, 1200.0, 2400.0, 4800.0, 9600.0),
     by_channel: bool = False,
+    absorbed: Absorbed | None = None,
 ) -> SlowError:
     """Most probable slow error of binned residuals.
 
@@ -278,10 +303,15 @@ def likely_slow_error(
         Values to choose from.
     by_channel : bool
         Whether every channel has its own; displacements always do, as likely whatever their size.
+    absorbed : Absorbed, optional
+        What the coordinates of the fit take up of the common slow error: the likelihood is then the
+        restricted one, without which an error is taken for smaller and shorter than it is.
+
+    Source: Patterson & Thompson (1971), Biometrika 58, 545-554.
     """
     several = [(bins, values[:, None]) for bins, values in residuals]
     choices = {"prior": prior, "prior_width": prior_width, "sigmas": sigmas, "times": times}
-    return slow_errors_of(several, **choices, by_channel=by_channel)[0][0]
+    return slow_errors_of(several, **choices, by_channel=by_channel, absorbed=absorbed)[0][0]
 
 
 def slow_errors_of(
@@ -293,6 +323,7 @@ def slow_errors_of(
     times: Sequence[float],
     size: Callable[[Array], Array] = np.square,
     by_channel: bool = False,
+    absorbed: Absorbed | None = None,
 ) -> list[tuple[SlowError, float]]:
     """Most probable slow error of each of several fits, and minus twice the logarithm of its likelihood.
 
@@ -310,15 +341,21 @@ def slow_errors_of(
     keys = list(dict.fromkeys(group))
     fits = residuals[0][1].shape[1]
     found = np.zeros((len(choices), len(keys), fits))
-    for row, slow in zip(found, choices, strict=True):
-        for own, (bins, values) in zip(group, residuals, strict=True):
-            whitener = Whitener(bins, SlowError(slow.sigma, slow.time))
+    taken_up = np.zeros(len(choices))
+    for number, (row, slow) in enumerate(zip(found, choices, strict=True)):
+        whiteners = [Whitener(bins, SlowError(slow.sigma, slow.time)) for bins, _ in residuals]
+        if absorbed is not None:
+            common = [item for own, item in zip(group, whiteners, strict=True) if own is COMMON]
+            taken_up[number] = absorbed.log_determinant(common)
+        for own, whitener, (_, values) in zip(group, whiteners, residuals, strict=True):
             size_of = 2.0 * whitener.log_root_determinant + size(whitener(values)).sum(axis=0)
             row[keys.index(own)] += size_of
         if prior is not None:
             for place, key in enumerate(keys):
                 if key is COMMON or key >= 0:
                     row[place] += (np.log(slow.sigma / prior.of(key).sigma) / prior_width) ** 2
+    if COMMON in keys:
+        found[:, keys.index(COMMON)] += (taken_up - taken_up.min())[:, None]
     best, least = found.argmin(axis=0), found.min(axis=0).sum(axis=0)
     errors = [_joined({key: choices[best[i, fit]] for i, key in enumerate(keys)}) for fit in range(fits)]
     return list(zip(errors, least.tolist(), strict=True))

@@ -6,7 +6,7 @@ from scipy.optimize import lsq_linear
 
 from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.fit_objective import bounded_step
-from spindle_fem.inference.reading_noise import ChannelBins, SlowError, Whitener, likely_slow_error
+from spindle_fem.inference.reading_noise import Absorbed, ChannelBins, SlowError, Whitener, likely_slow_error
 from spindle_fem.inference.robust_size import huber
 
 
@@ -93,3 +93,27 @@ def test_the_slow_error_of_a_known_process_is_found():
     assert found.time == 1200.0
     held = likely_slow_error(residuals, prior=SlowError(0.01, 1200.0), prior_width=0.005, **choices)
     assert held.sigma == 0.01
+
+
+def test_what_coordinates_take_up_of_a_slow_error_counts():
+    generator = np.random.default_rng(8)
+    true, bins = SlowError(0.05, 4800.0), bins_of(240, number=4.0, spacing=12.0)
+    root = np.eye(40)
+    choices = {"sigmas": (0.02, 0.03, 0.045, 0.065, 0.09), "times": (600.0, 1200.0, 2400.0, 4800.0)}
+    plain, restricted = [], []
+    whitener = Whitener(bins, true)
+    for _ in range(12):
+        hours = bins.times[:, None] / bins.times[-1] * np.arange(1, 9) * np.pi
+        columns = [0.1 * np.cos(hours) @ generator.normal(size=(8, 40)) for _ in range(5)]
+        errors = [bins.factor(true) @ generator.normal(size=240) for _ in columns]
+        white = np.concatenate([whitener(item) for item in columns])
+        moved = np.linalg.solve(
+            root + white.T @ white, white.T @ np.concatenate([whitener(item) for item in errors])
+        )
+        left = [(bins, error - own @ moved) for error, own in zip(errors, columns, strict=True)]
+        plain.append(likely_slow_error(left, **choices))
+        restricted.append(likely_slow_error(left, **choices, absorbed=Absorbed(columns, root)))
+    sizes = [np.mean([item.sigma * np.sqrt(item.time) for item in found]) for found in (plain, restricted)]
+    wanted = true.sigma * np.sqrt(true.time)
+    assert sizes[0] < 0.8 * wanted
+    assert sizes[1] == pytest.approx(wanted, rel=0.15)
