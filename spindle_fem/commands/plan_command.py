@@ -58,6 +58,21 @@ class Planned:
     notes: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What a plan is asked about, checked."""
+
+    machine: str | Path
+    overrides: tuple[str, ...]
+    conditions: Conditions
+    sensors: tuple[Sensor, ...]
+    recording: Recording
+    earlier: list[Recording]
+    seconds: float
+    test: str
+    inputs: Mapping[str, tuple[float, str]]
+
+
 def plan(
     machine: str | Path,
     folder: str | Path,
@@ -103,16 +118,11 @@ def plan(
     """
     started = time.perf_counter()
     tell = progress or LOGGER.info
+    asked = _asked(
+        machine, test=test, sensors=sensors, inputs=inputs, calibrate=calibrate, overrides=overrides
+    )
     with output_folder(folder) as place:
-        planned = planned_measurement(
-            machine,
-            test=test,
-            sensors=sensors,
-            inputs=inputs,
-            calibrate=calibrate,
-            overrides=overrides,
-            progress=tell,
-        )
+        planned = _planned(asked, progress=tell)
         content = plan_content(
             planned.plan,
             planned.sensors,
@@ -149,6 +159,22 @@ def planned_measurement(
 
     ``compare`` selects whether other tests are simulated too.
     """
+    asked = _asked(
+        machine, test=test, sensors=sensors, inputs=inputs, calibrate=calibrate, overrides=overrides
+    )
+    return _planned(asked, compare=compare, progress=progress)
+
+
+def _asked(
+    machine: str | Path,
+    *,
+    test: str | Path,
+    sensors: Sequence[str],
+    inputs: Sequence[str],
+    calibrate: Iterable[str | Path],
+    overrides: Iterable[str],
+) -> _Asked:
+    """Parameters of :func:`plan`, refused before any work where they cannot be meant."""
     overrides = tuple(overrides)
     names = partial(recordable_names, machine, overrides)
     given = dict(_input(text) for text in inputs)
@@ -181,15 +207,22 @@ def planned_measurement(
         conditions = _as_recorded(conditions, read)
         asked, chosen = _of_recording(read, sensors, conditions)
         seconds, words, full = float(np.ptp(read.times)), f'the inputs of "{read.name}"', {}
-    compared = min(seconds, LONGEST_COMPARED)
-    schedules = conditions.family(compared) if compare else []
-    recordings = [asked, *(recording_of(conditions, item, chosen) for item in schedules)]
     earlier = [read_recording(path, names=names) for path in calibrate]
-    opened = open_machine(machine, overrides, recordings, earlier, progress=progress)
+    return _Asked(machine, overrides, conditions, tuple(chosen), asked, earlier, seconds, words, full)
+
+
+def _planned(asked: _Asked, *, progress: Progress, compare: bool = True) -> Planned:
+    """What the plan says."""
+    conditions, full = asked.conditions, asked.inputs
+    compared = min(asked.seconds, LONGEST_COMPARED)
+    schedules = conditions.family(compared) if compare else []
+    recordings = [asked.recording, *(recording_of(conditions, item, asked.sensors) for item in schedules)]
+    begin = partial(open_machine, asked.machine, asked.overrides)
+    opened = begin(recordings, asked.earlier, progress=progress)
     # Usual sizes of effects, and of a network's errors, follow from what the sensors would read.
-    opened = open_machine(machine, overrides, as_predicted(opened, recordings), earlier, progress=progress)
+    opened = begin(as_predicted(opened, recordings), asked.earlier, progress=progress)
     opened = with_growth(opened)
-    found = plan_measurement(opened, schedules, asked=words, progress=progress)
+    found = plan_measurement(opened, schedules, asked=asked.test, progress=progress)
     little = says_too_little(_only_first(opened))
     notes = [f"A diagnosis of such a recording would refuse it: {little}"] if little else []
     if conditions.assumed:
@@ -201,7 +234,7 @@ def planned_measurement(
             f"Nothing says how large these inputs are; each is taken to warm the hottest node by "
             f"{USUAL_RISE:.0f} K in the end: {sizes}. Give what the test would run at with --input.",
         )
-    return Planned(found, conditions, tuple(chosen), words, full, compared, tuple(notes))
+    return Planned(found, conditions, asked.sensors, asked.test, full, compared, tuple(notes))
 
 
 def _shown(value: float, unit: str) -> tuple[float, str]:

@@ -15,7 +15,7 @@ def test_a_plan_shows_its_folder_while_it_works(tmp_path, monkeypatch) -> None:
         assert {"INCOMPLETE", "log.txt"} <= {path.name for path in folder.iterdir()}
         raise SpecError("test", "ends here.")
 
-    monkeypatch.setattr(plan_command, "planned_measurement", work)
+    monkeypatch.setattr(plan_command, "_planned", work)
     with pytest.raises(SpecError, match="ends here"):
-        plan_command.plan("pump", folder)
+        plan_command.plan("bench_motor", folder)
     assert (folder / "INCOMPLETE").exists()
