@@ -102,7 +102,7 @@ def _in_place_of(
     warmed = {_bearings_warmed(search, member)}
     far_off: set[tuple[str, str]] = set()
     tasks: list[Task] = []
-    for index, amplitude in screened.best_of(lambda c: c is not member, len(gains)):
+    for index in screened.best_of(lambda c: c is not member, len(gains)):
         variant = screened.variants[index]
         candidate = variant.candidate
         bearings = _bearings_warmed(search, candidate)
@@ -112,10 +112,11 @@ def _in_place_of(
         tried[candidate.effect] += 1
         good = gains[index] >= least and tried[candidate.effect] <= tuned.OTHER_SPOTS
         chosen = good and len(tasks) < tuned.EFFECTS_EXCHANGED
-        if chosen and is_far_off(variant, amplitude):
-            far_off.add(variant.key)
         if chosen or variant.key in far_off or _of_one_sensor(candidate, member):
+            amplitude = screened.amplitudes([index])[index]
             tasks.append(search.task(left, [(variant, amplitude)], intervals))
+            if chosen and is_far_off(variant, amplitude):
+                far_off.add(variant.key)
     return tasks
 
 
@@ -191,8 +192,8 @@ def _with_laws(
         # What is still to be found is small, and first order says how much it gains.
         least = tuned.LEAST_PROMISED_SHARE * float(gains.max(initial=0.0))
     return [
-        search.task(base.fit, [(screened.variants[index], amplitude)], {})
-        for index, amplitude in found
+        search.task(base.fit, [(screened.variants[index], screened.amplitudes([index])[index])], {})
+        for index in found
         if gains[index] >= least
     ]
 

@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 
 # Number of pieces into which variants are divided to compute their responses in parallel.
 PIECES = 2
-# Rounds in which size and prior of a factor are brought together; they change by a hundredth in the last.
+# Rounds in which size and prior of a factor are brought together: where readings tell the size as well as the
+# prior does, the last one changes it by less than a thousandth.
 SIZE_ROUNDS = 6
 
 
@@ -168,8 +169,8 @@ class Screened:
             chosen |= good[sets].all(axis=1)
         return sets[chosen]
 
-    def best_of(self, allowed: Callable[[Candidate], bool], number: int) -> list[tuple[int, float]]:
-        """Best variant of each effect and form at each place, among those allowed, with its amplitude."""
+    def best_of(self, allowed: Callable[[Candidate], bool], number: int) -> list[int]:
+        """Best variant of each effect and form at each place, among those allowed."""
         gain = self.singles()
         found: dict[tuple[str, str, str], int] = {}
         for index in np.argsort(-gain):
@@ -178,7 +179,7 @@ class Screened:
                 break
             if allowed(candidate):
                 found.setdefault((candidate.effect, candidate.component, candidate.form), int(index))
-        return [(index, self.amplitudes([index])[index]) for index in found.values()]
+        return list(found.values())
 
     def _distinct(self, sets: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Sets of different candidates, no two of one effect at one place or in one family."""
@@ -305,7 +306,7 @@ def spreads_at_size(variants: Sequence[Variant], gram: Array, data: Array) -> Ar
     spread = own
     for _ in range(SIZE_ROUNDS):
         size = np.abs(unit * data) / (np.diag(gram) + spread**-2.0)
-        spread = np.where(size > 0.0, own * size / np.log1p(np.where(size > 0.0, size, 1.0)), own)
+        spread = own * np.divide(size, np.log1p(size), out=np.ones_like(size), where=size > 0.0)
     return spread
 
 

@@ -129,9 +129,9 @@ def test_the_best_of_some_candidates(problem):
     found = screened(columns, data, keys=keys)
     singles = found.singles()
     order = [int(i) for i in np.argsort(-singles) if i != 2]
-    other = [i for i, _ in found.best_of(lambda c: c.effect != "effect2", 4)]
+    other = found.best_of(lambda c: c.effect != "effect2", 4)
     assert other == order[:4]
-    assert [i for i, _ in found.best_of(lambda c: c.component == "b", 4)] == [i for i in order if i % 2][:4]
+    assert found.best_of(lambda c: c.component == "b", 4) == [i for i in order if i % 2][:4]
 
 
 def test_forms_of_one_effect_at_one_place_never_come_together(problem):

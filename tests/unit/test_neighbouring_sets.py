@@ -41,6 +41,7 @@ class NotingSearch:
     interval_effects = ()
     effects = dict.fromkeys(("drift", "radiation", "lag"), SimpleNamespace(delays=False))
     view = SimpleNamespace(groups=(), sets={})
+    amplitude = 1.0
 
     def __init__(self, candidates=(HUMP, RAMP, BESIDE, ELSEWHERE), gains=None) -> None:
         self.candidates, self.gains = candidates, gains
@@ -92,7 +93,8 @@ class NotingSearch:
         found = SimpleNamespace(
             variants=[Variant(item, {}) for item in self.candidates],
             singles=lambda: np.array(self.gains),
-            best_of=lambda allowed, number: [(i, 1.0) for i in order if allowed(self.candidates[i])],
+            best_of=lambda allowed, number: [i for i in order if allowed(self.candidates[i])],
+            amplitudes=lambda members: dict.fromkeys(members, self.amplitude),
         )
         return found, {}
 
@@ -135,6 +137,24 @@ def test_all_that_a_sensor_may_do_and_a_few_others_are_tried_in_the_place_of_its
     exchanged(search)
     few = laws[1 : 1 + tuned.EFFECTS_EXCHANGED - tuned.OTHER_SPOTS]
     assert search.asked == {identity((c,)) for c in (*places, *few, other)}
+
+
+@pytest.mark.parametrize(("amplitude", "tried"), [(-1.0, False), (-40.0, True)])
+def test_other_forms_of_a_factor_are_tried_where_it_is_far_off(amplitude, tried):
+    """Seats that conduct a twentieth: to first order inner and outer rings say little of each other."""
+    seats = []
+    for form in ("inner", "outer"):
+        term = Term()
+        term.name = f"seats.room.{form}"
+        term.parameters = (TermParameter("factor", 1.0, 0.6),)
+        name = f"{term.name}.factor"
+        seats.append(Candidate("seats", "room", form, "parameter", name, 1.0, 0.6, terms=(term,)))
+    least = -tuned.EXCHANGE_PROMISES * tuned.HOPELESS_SCORE
+    search = NotingSearch((HUMP, *seats), (0.0, least + 1.0, least - 1.0))
+    search.effects = dict.fromkeys(("drift", "seats"), SimpleNamespace(delays=False))
+    search.amplitude = amplitude
+    exchanged(search)
+    assert search.asked == {identity((seat,)) for seat in seats[: 1 + tried]}
 
 
 def test_intervals_at_bearings_of_the_set_that_was_found_hide_no_other_place():
