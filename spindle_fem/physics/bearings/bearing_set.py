@@ -372,7 +372,7 @@ def _solve(
             where=where,
         )  # fmt: skip
     except NoEquilibriumError as error:
-        # Loads that are not all one stand side by side only behind the one that is asked for.
+        # Of loads side by side the first is the one that was asked for.
         raise _under(error, loads[0]) from error
     if recent is not None:
         recent[key] = speed, solved
@@ -384,8 +384,7 @@ def _under(error: NoEquilibriumError, load: ExternalLoad) -> NoEquilibriumError:
     radial = abs(load.radial)
     across = f" and {radial:.0f} N across" if radial else ""
     what = f"{error.what.removesuffix('.')}, with {load.thrust:.0f} N along the shaft{across}."
-    less = " Or less radial load." if radial and "radial" not in error.how_to_fix else ""
-    return NoEquilibriumError(error.where, what, f"{error.how_to_fix}{less}")
+    return NoEquilibriumError(error.where, what, error.how_to_fix)
 
 
 __all__ = [

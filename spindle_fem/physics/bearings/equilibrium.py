@@ -404,6 +404,6 @@ def _continue_in_speed(
             raise NoEquilibriumError(
                 where,
                 f"no quasi-static equilibrium at {rpm:.0f} rpm: {cause}{onset}.",
-                "Raise preload or axial load, or lower the speed.",
+                "Raise preload or axial load, or lower the speed or any radial load.",
             )
     return attempt
