@@ -128,6 +128,16 @@ class Belief:
         """Where a fit begins, (p,)."""
         return self.mean if self.begin is None else self.begin
 
+    def beside(self, number: int) -> tuple[Array, Array]:
+        """Root of the precision (n, n) and mean (n,) of ``number`` coordinates that begin with these.
+
+        The others have unit normal priors.
+        """
+        own = len(self.coordinates)
+        root, mean = np.eye(number), np.zeros(number)
+        root[:own, :own], mean[:own] = self.root, self.mean
+        return root, mean
+
     def at(self, position: Array) -> Departure:
         """How far coordinates (p,) are from what is known of them."""
         own = self.root @ (position - self.mean)

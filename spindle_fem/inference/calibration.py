@@ -185,7 +185,8 @@ def calibrate(
     fit: Fit | None = None
     for attempt in range(1 if slow is not None else rounds):
         if problem is not None and fit is not None:
-            error = likely_slow_error(problem.binned_residuals(fit), prior=SlowError())
+            left = problem.binned_residuals(fit)
+            error = likely_slow_error(left, prior=SlowError(), absorbed=problem.absorbed(fit))
         progress(f"calibration: fit {attempt + 1}")
         problem = Problem(predictor, belief, error, predictor.observations)
         fit = problem.fit((), None if fit is None else fit.values, exact=True)

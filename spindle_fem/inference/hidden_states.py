@@ -76,10 +76,7 @@ def readings_about(
     coordinates = [fit.coordinates[i] for i in kept]
     # About the machine without what is left out, whose part would else pass for that of the parameters.
     predicted = predictor.predict(number, values, rest, [c.name for c in coordinates])
-    root = np.eye(len(coordinates))
-    machine = len(problem.belief.coordinates)
-    root[:machine, :machine] = fit.known.root
-    mean = np.concatenate((fit.known.mean, np.zeros(len(coordinates) - machine)))
+    root, mean = fit.known.beside(len(coordinates))
     by = predicted.sensitivity * np.array([c.sigma for c in coordinates])
     model = predicted.temperature
     if everything:

@@ -27,7 +27,7 @@ from spindle_fem.inference.fit_objective import Objective, bounded_step
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.reading_noise import ChannelBins, SlowError, Whitener
+from spindle_fem.inference.reading_noise import Absorbed, ChannelBins, SlowError, Whitener
 from spindle_fem.inference.robust_size import huber, outlier_weight
 
 Array = NDArray[np.float64]
@@ -227,6 +227,15 @@ class Problem:
             (item.bins, item.at(predicted[item.recording][:, item.channel]) - item.values)
             for item in self.observations
         ]
+
+    def absorbed(self, fit: Fit) -> Absorbed:
+        """What the coordinates of a fit take up of an error of the temperatures."""
+        predicted = self.predict(fit.candidates, fit.coordinates, fit.position)
+        root, _ = fit.known.beside(len(fit.coordinates))
+        warm = [item for item in self.observations if not item.bins.is_relative]
+        return Absorbed(
+            [item.at(predicted[item.recording].sensitivity[:, item.channel]) for item in warm], root
+        )
 
     def predict(
         self,

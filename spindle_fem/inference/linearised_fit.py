@@ -296,10 +296,7 @@ class LinearProblem:
         predicted = problem.predict(fit.candidates, fit.coordinates, fit.position)
         jacobian = problem.whitened([p.sensitivity for p in predicted])
         residual = problem.data - problem.whitened([p.temperature for p in predicted])
-        n_machine = len(problem.belief.coordinates)
-        root = np.eye(len(fit.coordinates))
-        root[:n_machine, :n_machine] = fit.known.root
-        mean = np.concatenate((fit.known.mean, np.zeros(len(fit.coordinates) - n_machine)))
+        root, mean = fit.known.beside(len(fit.coordinates))
         # The tails that a robust fit discounts are discounted here too.
         astray = residual if trust is None else trust.residual
         weight = np.sqrt(outlier_weight(astray))

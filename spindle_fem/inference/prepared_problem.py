@@ -163,24 +163,16 @@ def expected_slow_error(predictor: Predictor) -> SlowError:
 
 def slow_error_of(problem: Problem, fit: Fit) -> SlowError:
     """Most probable slow error of what a fit leaves."""
-    return likely_slow_error(
-        problem.binned_residuals(fit), **_slow_choices(problem.predictor), absorbed=_absorbed(problem, fit)
-    )
+    choices = _slow_choices(problem.predictor)
+    return likely_slow_error(problem.binned_residuals(fit), **choices, absorbed=_absorbed(problem, fit))
 
 
 def _absorbed(problem: Problem, fit: Fit) -> Absorbed | None:
-    """What the coordinates of a fit take up of slow errors; None for a network: its channels have their own.
+    """What a fit takes up of slow errors; None for a network, each channel of which has its own.
 
-    A machine that is drawn has a hundred, which follow an error of hours in part.
+    Coordinates of a machine that is drawn are a hundred, which follow an error of hours in part.
     """
-    if problem.predictor.is_network:
-        return None
-    predicted = problem.predict(fit.candidates, fit.coordinates, fit.position)
-    root = np.eye(len(fit.coordinates))
-    number = len(problem.belief.coordinates)
-    root[:number, :number] = problem.belief.root
-    warm = [item for item in problem.observations if not item.bins.is_relative]
-    return Absorbed([item.at(predicted[item.recording].sensitivity[:, item.channel]) for item in warm], root)
+    return None if problem.predictor.is_network else problem.absorbed(fit)
 
 
 def with_inexact_laws(problem: Problem, fit: Fit) -> Problem:
@@ -231,8 +223,7 @@ def with_own_noise(
     """
     choices = _slow_choices(plain.predictor)
     fits = [item.fit for item in hypotheses]
-    nothing = next(fit for fit in fits if not fit.candidates)
-    choices["absorbed"] = _absorbed(plain, nothing)
+    choices["absorbed"] = _absorbed(plain, next(fit for fit in fits if not fit.candidates))
     for index, fit in enumerate(fits):
         # Nothing missing is fitted anew: what the others explain it must take for error.
         slow = plain.slow if fit.candidates else likely_slow_error(residuals(fit), **choices)
