@@ -35,7 +35,8 @@ class Variant:
     Attributes
     ----------
     shape : mapping of outer name to float
-        Values of parameters other than the amplitude.
+        Values of parameters other than the amplitude; of that one the size at which the candidate's answer is
+        taken, where that is not its reference.
     """
 
     candidate: Candidate
@@ -45,6 +46,11 @@ class Variant:
     def key(self) -> tuple[str, str]:
         """Effect and place."""
         return self.candidate.effect, self.candidate.component
+
+    @property
+    def reference(self) -> float:
+        """Amplitude at which its answer is taken: one unit of it."""
+        return self.shape.get(self.candidate.amplitude, self.candidate.reference)
 
     def values(self, amplitude: float) -> dict[str, float]:
         """Every parameter with the amplitude given."""
@@ -162,7 +168,7 @@ class BaseRun:
         start, end = np.zeros((steps, size, len(variants))), np.zeros((steps, size, len(variants)))
         inlet = np.zeros((steps + 1, len(variants)))
         for position, variant in enumerate(variants):
-            values = variant.values(variant.candidate.reference)
+            values = variant.values(variant.reference)
             for term in variant.candidate.terms:
                 if term.is_dynamic:
                     terms = EffectTerms((term,), values)
@@ -263,7 +269,7 @@ class BaseRun:
 
     def _reading(self, variant: Variant) -> Array:
         """Difference of one channel that a sensor effect makes, (G + 1, c)."""
-        values = self.values | variant.values(variant.candidate.reference)
+        values = self.values | variant.values(variant.reference)
         predicted = self.predicted()
         shown = self.predictor.read(self.number, [variant.candidate], values, predicted, self._inlet)
         return shown - predicted
@@ -277,7 +283,7 @@ class BaseRun:
             candidate = variant.candidate
             own: list[tuple[str, float]] = []
             for factor in candidate.factors:
-                step = float(np.log(candidate.reference)) if factor.logarithmic else candidate.reference - 1.0
+                step = float(np.log(variant.reference)) if factor.logarithmic else variant.reference - 1.0
                 own.append((factor.name, step))
             steady = [term for term in candidate.terms if term.is_steady]
             if steady:
@@ -289,11 +295,11 @@ class BaseRun:
                     values |= {f"{copy.name}.{key}": value for key, value in given.items()}
                     terms.append(copy)
                     item = next(p for p in term.parameters if p.name == inner)
-                    difference = candidate.reference - candidate.null
+                    difference = variant.reference - candidate.null
                     own.append(
                         (
                             f"{copy.name}.{inner}",
-                            float(np.log(candidate.reference / candidate.null))
+                            float(np.log(variant.reference / candidate.null))
                             if item.logarithmic
                             else difference,
                         )

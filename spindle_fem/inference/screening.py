@@ -285,8 +285,8 @@ def amplitude_spread(variant: Variant) -> float:
     candidate = variant.candidate
     item = candidate.parameters[candidate.amplitude]
     if item.logarithmic:
-        return item.sigma / abs(float(np.log(candidate.reference / candidate.null)))
-    return item.sigma / abs(candidate.reference - candidate.null)
+        return item.sigma / abs(float(np.log(variant.reference / candidate.null)))
+    return item.sigma / abs(variant.reference - candidate.null)
 
 
 def spreads_at_size(variants: Sequence[Variant], gram: Array, data: Array) -> Array:
@@ -315,14 +315,14 @@ def _logarithm_of_reference(variant: Variant) -> float:
     candidate = variant.candidate
     if not candidate.parameters[candidate.amplitude].logarithmic:
         return 0.0
-    return float(np.log(candidate.reference / candidate.null))
+    return float(np.log(variant.reference / candidate.null))
 
 
 def is_one_sided(variant: Variant) -> float:
     """1 where an amplitude cannot be negative, 0 where it can."""
     candidate = variant.candidate
     item = candidate.parameters[candidate.amplitude]
-    upwards = candidate.reference > candidate.null
+    upwards = variant.reference > candidate.null
     bound = item.low if upwards else item.high
     return 1.0 if bound == candidate.null else 0.0
 
@@ -332,9 +332,9 @@ def amplitude_value(variant: Variant, scaled: float) -> float:
     candidate = variant.candidate
     item = candidate.parameters[candidate.amplitude]
     if item.logarithmic:
-        value = candidate.null * float(np.exp(scaled * np.log(candidate.reference / candidate.null)))
+        value = candidate.null * float(np.exp(scaled * np.log(variant.reference / candidate.null)))
     else:
-        value = candidate.null + scaled * (candidate.reference - candidate.null)
+        value = candidate.null + scaled * (variant.reference - candidate.null)
     return float(np.clip(value, item.low, item.high))
 
 

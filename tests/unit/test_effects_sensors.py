@@ -228,3 +228,14 @@ def test_a_recording_too_short_for_a_period_has_none():
     times = np.arange(0.0, 150.0, 10.0)
     assert strongest_periods(times, np.zeros((times.size, 1)), 100.0, 3000.0) == []
     assert strongest_periods(np.arange(0.0, 7200.0, 10.0), np.zeros((720, 1)), 100.0, 3000.0) == []
+
+
+@pytest.mark.parametrize(
+    ("effect", "sizes"),
+    [("clock_shift", {-200.0, 800.0, -800.0}), ("sensor_lag", {800.0, 3200.0}), ("sensor_offset", set())],
+)
+def test_delays_are_sought_from_several_sizes(effect, sizes):
+    candidate = reading_of(effect)
+    times, nothing = np.zeros(0), np.zeros((0, 1))
+    starts = catalogue()[effect].starts_from(candidate, times, nothing)
+    assert {start[candidate.amplitude] for start in starts if start} == sizes

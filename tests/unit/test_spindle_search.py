@@ -245,3 +245,20 @@ def test_one_heat_at_two_spots_is_one_finding_that_names_both(case, heated):
     (told,) = findings_of(heated, Ranked(Hypothesis(fit, -1.0), 0.8), split=True)
     assert (told["component"], told["probability"]) == ("shaft", 0.8)
     assert told["statement"].endswith("It enters at the nose as well.")
+
+
+def test_a_clock_far_off_is_fitted_from_about_as_far_off(case):
+    """Twenty minutes early about a start: to first order readings seem half a minute late, if anything."""
+    early = ("clock_shift", "SP03")
+    search = search_over(case, case.diagnosis(early, -1200.0, "sensor", ()))
+    search.found = {}
+    search.keep(Hypothesis(search.problem.fit(), -1.0))
+    null = search.found[identity(())].fit
+    screened, intervals = search.screened(null, only_laws=True)
+    ((members, _),) = screened.best(1, 1)
+    assert screened.variants[members[0]].key == early
+    search.extend(null, screened, intervals, 1, 1, always=1)
+    found = search.ranked()[0].fit
+    (candidate,) = found.candidates
+    assert found.values[candidate.amplitude] == pytest.approx(-1200.0, abs=20.0)
+    assert found.reduced_misfit < 1.1

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import Candidate, Effect, Reading
+from spindle_fem.effects.framework.effect import Array, Candidate, Effect, Reading
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import TermParameter
 from spindle_fem.recordings.align import Recording
@@ -20,6 +20,9 @@ Form = tuple[tuple[TermParameter, ...], float, Sequence[Mapping[str, float]]]
 
 # A sensor that shows less than this share of a change says nothing of the temperature at its place.
 LEAST_SHOWN = 0.1
+# Sizes of a delay from which searches begin beside its reference, each so many times the one before: readings
+# follow one that is longer than a change of load takes to nothing like first order.
+DELAY_RATIO = 4.0
 
 
 def as_felt(
@@ -97,3 +100,16 @@ class SensorEffect(Effect):
                     )
                 )
         return tuple(found)
+
+    def starts_from(
+        self, candidate: Candidate, times: Array, residual: Array
+    ) -> tuple[Mapping[str, float], ...]:
+        """What makes a channel late, or early, also from larger sizes and from the other sign."""
+        if not self.delays:
+            return candidate.starts
+        item = candidate.parameters[candidate.amplitude]
+        longest = max(abs(item.low), item.high)
+        number = 1 + int(np.log(longest / candidate.reference) / np.log(DELAY_RATIO))
+        sizes = candidate.reference * DELAY_RATIO ** np.arange(number)
+        further = [size for size in (*sizes[1:], *-sizes) if item.low <= size <= item.high]
+        return (*candidate.starts, *({candidate.amplitude: float(size)} for size in further))
