@@ -27,7 +27,7 @@ from spindle_fem.inference.fit_objective import Objective, bounded_step
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.prediction import Prediction
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.reading_noise import Absorbed, ChannelBins, SlowError, Whitener
+from spindle_fem.inference.reading_noise import Absorbed, ChannelBins, SlowError, Whitener, whiteners_of
 from spindle_fem.inference.robust_size import huber, outlier_weight
 
 Array = NDArray[np.float64]
@@ -183,7 +183,7 @@ class Problem:
     _straight: dict[str, Array] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        self.whiteners = [Whitener(item.bins, self.slow) for item in self.observations]
+        self.whiteners = whiteners_of([item.bins for item in self.observations], self.slow)
         self.data = np.concatenate(
             [white(item.values) for item, white in zip(self.observations, self.whiteners, strict=True)]
         )

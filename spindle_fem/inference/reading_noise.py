@@ -251,6 +251,20 @@ class Whitener:
         return ((flat - expected) / self._scale[:, None]).reshape(values.shape)
 
 
+def whiteners_of(every: Sequence[ChannelBins], slow: SlowError) -> list[Whitener]:
+    """A whitener for each of several bins; those read at the same times with the same errors share one."""
+    made: dict[tuple, Whitener] = {}
+    found = []
+    for bins in every:
+        own = slow.of(bins.key)
+        read = (item.tobytes() for item in (bins.times, bins.number, bins.spacing))
+        alike = (own.sigma, own.time, bins.white, bins.is_relative, *read)
+        if alike not in made:
+            made[alike] = Whitener(bins, slow)
+        found.append(made[alike])
+    return found
+
+
 def whiten(factor: Array, values: Array) -> Array:
     """``L⁻¹ x``: unit variance, uncorrelated."""
     return solve_triangular(factor, values, lower=True, check_finite=False)
@@ -343,7 +357,7 @@ def slow_errors_of(
     found = np.zeros((len(choices), len(keys), fits))
     taken_up = np.zeros(len(choices))
     for number, (row, slow) in enumerate(zip(found, choices, strict=True)):
-        whiteners = [Whitener(bins, SlowError(slow.sigma, slow.time)) for bins, _ in residuals]
+        whiteners = whiteners_of([bins for bins, _ in residuals], SlowError(slow.sigma, slow.time))
         if absorbed is not None:
             common = [item for own, item in zip(group, whiteners, strict=True) if own is COMMON]
             taken_up[number] = absorbed.log_determinant(common)

@@ -1,12 +1,21 @@
 """Steps of a fit within bounds, large residuals, and readings whose errors are correlated."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
 from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.fit_objective import bounded_step
-from spindle_fem.inference.reading_noise import Absorbed, ChannelBins, SlowError, Whitener, likely_slow_error
+from spindle_fem.inference.reading_noise import (
+    Absorbed,
+    ChannelBins,
+    SlowError,
+    Whitener,
+    likely_slow_error,
+    whiteners_of,
+)
 from spindle_fem.inference.robust_size import huber
 
 
@@ -66,6 +75,16 @@ def test_whitened_readings_are_independent_of_unit_variance():
     white = Whitener(bins, slow)
     assert white(factor) == pytest.approx(np.eye(60), abs=1e-10)
     assert white.log_root_determinant == pytest.approx(0.5 * np.linalg.slogdet(factor @ factor.T)[1])
+
+
+def test_channels_that_are_read_alike_share_a_whitener_and_others_do_not():
+    first, slow = bins_of(60), SlowError(0.2, 700.0, channels=((3, 0.1, 700.0),))
+    every = [replace(first, key=1), replace(first, key=2), replace(first, white=0.2), replace(first, key=3)]
+    whiteners = whiteners_of([*every, replace(first, times=first.times + 1.0), replace(first, key=-1)], slow)
+    assert whiteners[0] is whiteners[1]
+    assert len({id(item) for item in whiteners}) == 5
+    for bins, shared in zip(every, whiteners, strict=False):
+        assert shared.factor == pytest.approx(Whitener(bins, slow).factor)
 
 
 def test_the_filter_is_the_cholesky_factor(monkeypatch):
