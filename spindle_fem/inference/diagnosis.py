@@ -198,7 +198,7 @@ def diagnose_recordings(
     slow = slow_error_of(problem, best.fit)
     trials = len({(c.effect, c.component) for c in candidates})
     empty = next(h for h in found if not h.fit.candidates)
-    wrong = wrong_direction(problem.belief, empty.fit, directions, trials, coarseness)
+    wrong = wrong_direction(problem, empty.fit, directions, trials, coarseness)
     if wrong is not None and wrong.log_gain > max(0.0, best.score - empty.score):
         belief = wrong.belief
         problem = Problem(small, belief, slow, small.observations)

@@ -14,7 +14,8 @@ from scipy.special import chdtrc
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import THETA_BOUND, Belief
-from spindle_fem.inference.hypothesis_fit import Fit
+from spindle_fem.inference.hypothesis_fit import Fit, Problem
+from spindle_fem.inference.linearised_fit import Box, LinearProblem, bounded_minimum
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.verdict import PRIOR_SIGMAS, Judgement
 
@@ -43,21 +44,22 @@ class WrongDirection:
 
 
 def wrong_direction(
-    belief: Belief, null: Fit, directions: Sequence[Misdescription], trials: int, coarseness: float = 1.0
+    problem: Problem, null: Fit, directions: Sequence[Misdescription], trials: int, coarseness: float = 1.0
 ) -> WrongDirection | None:
     """The direction whose prior had best be given up; None where there are no directions.
 
-    An offset of the prior's mean in one direction, itself normal with the width ``w = WIDER``, changes the
-    cost of a fit with nothing missing to second order: with ``g`` the prior's pull there and ``h`` what is
-    left of its curvature once everything else follows, the gain is ``g² / (h + 1/w²)``.
+    An offset of the prior's mean in one direction, itself normal with the width ``WIDER``, lowers the cost of
+    a fit with nothing missing, to first order in the coordinates and between their bounds. Its complexity is
+    that of ``h``, what is left of the prior's curvature there once everything else follows.
 
     Parameters
     ----------
     null : Fit
-        With nothing missing, on that belief.
+        With nothing missing, of that problem.
     trials : int
         Candidates that might explain the recording instead: each as likely beforehand as one direction.
     """
+    belief = problem.belief
     names = [c.name for c in belief.coordinates]
     owned = [
         item
@@ -67,18 +69,40 @@ def wrong_direction(
     if not owned:
         return None
     rows = [names.index(item.coordinate) for item in owned]
+    box = LinearProblem.about(problem, null).box
+    settled = _least(box)
+    misfit = np.array([settled - _least(_freed(box, belief, null, row)) for row in rows])
     count = len(names)
     precision = belief.root.T @ belief.root
-    pull = (precision @ (null.position[:count] - belief.mean))[rows]
     left = np.diag(precision - precision @ null.covariance[:count, :count] @ precision)[rows]
     left = np.maximum(left, 0.0)
-    misfit = pull**2 / (left + WIDER**-2)
     prior = np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(len(owned) + trials)
     gains = 0.5 * misfit / (coarseness * tuned.GAIN_DIVISOR) - 0.5 * np.log1p(WIDER**2 * left) + prior
     best = int(np.argmax(gains))
     level = float(chdtrc(1, misfit[best] / (coarseness * tuned.CHANCE_DIVISOR)))
     p_value = float(-np.expm1(len(owned) * np.log1p(-min(level, 1.0 - 1e-16))))
     return WrongDirection(owned[best], without_prior(belief, rows[best]), float(gains[best]), p_value)
+
+
+def _least(box: Box) -> float:
+    """Least cost within a box."""
+    move = bounded_minimum(box.hessian, box.downhill, box.low, box.high)
+    return box.cost + float(move @ (box.hessian @ move)) - 2.0 * float(box.downhill @ move)
+
+
+def _freed(box: Box, belief: Belief, null: Fit, row: int) -> Box:
+    """A box about a fit with the prior of one coordinate given up, as :func:`without_prior` has it."""
+    precision = belief.root.T @ belief.root
+    departure = null.position[: len(precision)] - belief.mean
+    less = np.outer(precision[row], precision[row]) / (precision[row, row] + WIDER**-2)
+    hessian, downhill = box.hessian.copy(), box.downhill.copy()
+    hessian[: len(less), : len(less)] -= less
+    downhill[: len(less)] += less @ departure
+    low, high = box.low.copy(), box.high.copy()
+    bound = THETA_BOUND * WIDER
+    low[row], high[row] = -bound - null.position[row], bound - null.position[row]
+    cost = box.cost - float(departure @ less @ departure)
+    return replace(box, hessian=hessian, downhill=downhill, low=low, high=high, cost=cost)
 
 
 def without_prior(belief: Belief, row: int) -> Belief:
