@@ -188,7 +188,7 @@ def _inferred(
     if not switched:
         held = _held_out(problem.predictor, place.recording)
         again = replace(again, level=np.where(held, again.level, course.level))
-        if np.array_equal(again.level, course.level):
+        if not again.on.any() or np.array_equal(again.level, course.level):
             return None
     intervals = intervals_of(again.level, drive.grid)
     middle = 0.5 * (drive.grid[1:] + drive.grid[:-1])

@@ -22,6 +22,8 @@ from spindle_fem.inference.robust_size import huber
 OF_INTERVALS, OF_SENSORS = ("start_", "end_"), ("start", "time")
 # Moments tried over a stretch before the best of them is refined, and how closely, as a share of the stretch.
 TRIED, CLOSENESS = 9, 0.01
+# Share of its distance from the moments beside it, of the same set's member, that a moment keeps.
+KEPT_APART = 0.1
 # A moment may lie in a stretch beside it if, at its near end, the readings are this little less likely.
 FLAT = 10.0
 # What an input that changed earlier does is bent over the time: rounds about the values found before.
@@ -32,14 +34,20 @@ def unseen_moments(predictor: Predictor, fit: Fit) -> dict[str, float]:
     """Values of the moments that may lie in held-out stretches, by name [s]; all else as it was fitted.
 
     In the stretch in which the fit has it, and in those next to it up to which fitted readings do not tell.
+    Moments of one member stay in their order: none begins after it ends.
     """
     found: dict[str, float] = {}
-    for candidate, name in _moments(fit):
+    for candidate, name, others in _moments(fit):
         number = candidate.recording or 0
         held = stretches(~predictor.use[number], predictor.stamps(number))
-        misfit = _MomentMisfit(predictor, fit, fit.values | found, name)
+        values = fit.values | found
+        misfit = _MomentMisfit(predictor, fit, values, name)
+        low, high = _room(misfit.moment, [values[other] for other in others])
         best = misfit.moment
-        for begin, end in _beside(held, misfit.moment):
+        for first, last in _beside(held, misfit.moment):
+            begin, end = max(first, low), min(last, high)
+            if begin >= end:
+                continue
             inside = begin <= misfit.moment <= end
             if inside or misfit.cost_at(min(max(misfit.moment, begin), end)) < misfit.cost + FLAT:
                 best = min(best, misfit.best_within(begin, end), key=misfit.cost_at)
@@ -52,7 +60,7 @@ def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
     """What inputs did between the rows of held-out stretches, from all readings: values by name.
 
     Within the bounds of what rows leave open, as far from what was fitted as that is uncertain; all else as
-    it was fitted.
+    it was fitted. Fitted readings have told what they know by the fit: those held out are left to tell.
     """
     known = {c.name: c for c in fit.coordinates}
     deviation = dict(zip(known, np.sqrt(np.diag(fit.covariance)), strict=True))
@@ -62,15 +70,15 @@ def unread_changes(predictor: Predictor, fit: Fit) -> dict[str, float]:
         values = {
             name: fit.values[name] for name in predictor.unread_within(number, held, {}) if name in known
         }
-        if not values:
-            continue
-        predicted = predictor.predict(number, fit.values, fit.candidates).temperature
         # The constant of a displacement is free: temperatures tell.
         seen = [
             (item, np.hypot(item.bins.white, fit.slow.sigma))
-            for item in (*predictor.observations, *predictor.heldout)
+            for item in predictor.heldout
             if item.recording == number and not item.bins.is_relative
         ]
+        if not (values and seen):
+            continue
+        predicted = predictor.predict(number, fit.values, fit.candidates).temperature
         coordinates = [known[name] for name in values]
         fitted = np.array([c.of(v) for c, v in zip(coordinates, values.values(), strict=True)])
         known_to = np.array([deviation[name] for name in values])
@@ -110,14 +118,27 @@ def _beside(held: list[tuple[float, float]], moment: float) -> list[tuple[float,
     return [*inside, *before[-1:], *[pair for pair in held if pair[0] > moment][:1]]
 
 
-def _moments(fit: Fit) -> Iterator[tuple[Candidate, str]]:
-    """Candidates with the names of their free moments."""
+def _room(moment: float, others: Sequence[float]) -> tuple[float, float]:
+    """Times to which a moment may move between others [s]."""
+    share = 1.0 - KEPT_APART
+    before = max((other for other in others if other < moment), default=-np.inf)
+    after = min((other for other in others if other > moment), default=np.inf)
+    return moment + share * (before - moment), moment + share * (after - moment)
+
+
+def _moments(fit: Fit) -> Iterator[tuple[Candidate, str, list[str]]]:
+    """Candidates with the name of each of their free moments, and those of the others."""
     known = {c.name for c in fit.coordinates}
     for candidate in fit.candidates:
-        for name, item in candidate.free.items():
-            is_moment = item.name.startswith(OF_INTERVALS) or item.name in OF_SENSORS
-            if is_moment and item.unit == "s" and name in known:
-                yield candidate, name
+        own = [
+            name
+            for name, item in candidate.free.items()
+            if (item.name.startswith(OF_INTERVALS) or item.name in OF_SENSORS)
+            and item.unit == "s"
+            and name in known
+        ]
+        for name in own:
+            yield candidate, name, [other for other in own if other != name]
 
 
 class _MomentMisfit:
