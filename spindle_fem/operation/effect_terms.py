@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.term import Term, TermContext
+from spindle_fem.effects.framework.term import FLOW, Term, TermContext
 from spindle_fem.errors import SpecError, did_you_mean
+from spindle_fem.operation.operating_point import OperatingPoint
 
 Array = NDArray[np.float64]
 Positions = slice | NDArray[np.int64]
@@ -451,3 +452,26 @@ def multiplied(parts: Iterable[Mapping[str, float]]) -> dict[str, float]:
         for name, factor in part.items():
             found[name] = found.get(name, 1.0) * factor
     return found
+
+
+def operating_factors(
+    terms: Sequence[Term], values: Sequence[Mapping[str, float]], point: OperatingPoint
+) -> list[dict[str, float]]:
+    """Factors that each term puts on coefficients at an operating point.
+
+    Laws of the coolant see the flow that other terms leave of the recorded one.
+
+    Parameters
+    ----------
+    values : sequence of mapping of str to float
+        Parameters of each term by inner name.
+    """
+    found = [term.operating_factor(point, own) for term, own in zip(terms, values, strict=True)]
+    left = multiplied(found).get(FLOW, 1.0)
+    if left == 1.0:
+        return found
+    throttled = replace(point, coolant_flow=left * point.coolant_flow)
+    return [
+        part if FLOW in part else term.operating_factor(throttled, own)
+        for term, own, part in zip(terms, values, found, strict=True)
+    ]

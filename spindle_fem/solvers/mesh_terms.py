@@ -27,6 +27,7 @@ from spindle_fem.operation.effect_terms import (
     EffectTerms,
     Instants,
     multiplied,
+    operating_factors,
     require_known,
 )
 from spindle_fem.operation.loads import LoadChange
@@ -287,7 +288,7 @@ class FieldTerms:
         factors = multiplied(
             (
                 self._factors,
-                *(term.operating_factor(point, own) for term, own in self._each()),
+                *operating_factors(terms.terms, terms.values, point),
                 dict(zip(terms.coefficients, answers.factor.value[0].tolist(), strict=True)),
                 {
                     f"heat.{name}": value

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from spindle_fem.effects.framework.term import Term, TermParameter
+from spindle_fem.effects.catalogue.coolant_bypass import BypassTerm
+from spindle_fem.effects.framework.term import CHANNEL_FILM, Term, TermParameter
 from spindle_fem.errors import ConvergenceError, OutOfValidityError, SpecError
 from spindle_fem.model.reduced import added_heat, term_march
 from spindle_fem.model.reduced.drive import STANDARD, make_drive
 from spindle_fem.model.reduced.reduced_transient import TransientRun, simulate_fast
+from spindle_fem.model.reduced.run_operators import run_operators
 from spindle_fem.model.reduced.term_march import TermMarch
 from spindle_fem.operation.effect_terms import Derivatives
 from tests.support.lumped_spindle import drive_of
@@ -170,6 +172,32 @@ def test_operating_points_that_hardly_differ_have_the_same_operators(fast, steps
     assert len(set(asked.step_class.tolist())) > 4
     unasked = TransientRun(fast, drive, {}, (), (Transition(),), same_within=5e-3)
     assert len(set(unasked.step_class.tolist())) == 2
+
+
+def test_a_law_of_the_flow_follows_what_a_bypass_leaves_of_it(fast, steps):
+    class ByFlow(Term):
+        """A film by the square root of the flow, 1 at that of the drive."""
+
+        name = "by_flow"
+
+        def operating_factor(self, point, parameters):
+            return {CHANNEL_FILM: (point.coolant_flow / steps.points[0].coolant_flow) ** 0.5}
+
+    bypass, fraction = BypassTerm("bypass"), "bypass.fraction"
+
+    def film(*terms):
+        return run_operators(fast, steps.points, {fraction: 0.36}, (), terms).coefficients[0][CHANNEL_FILM]
+
+    assert film(bypass, ByFlow()) == pytest.approx(0.8 * film(bypass))
+
+    def told(share):
+        given = {"terms": (ByFlow(), bypass), "parameters": {fraction: share}, "derivatives": (fraction,)}
+        return simulate_fast(fast, steps, 293.15, **given)
+
+    difference = (told(0.37).temperature - told(0.35).temperature) / 0.02
+    exact = told(0.36).sensitivity[:, :, 0]
+    assert np.abs(difference).max() > 1.0
+    np.testing.assert_allclose(exact, difference, atol=2e-3 * np.abs(difference).max())
 
 
 def test_a_constant_factor_as_a_term_is_a_factor_of_the_machine(fast, steps):

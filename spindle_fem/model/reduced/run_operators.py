@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.term import FLOW, Term, TermParameter
 from spindle_fem.errors import SpecError, did_you_mean
 from spindle_fem.model.reduced.fast_model import ClassOperators, FastModel
-from spindle_fem.operation.effect_terms import multiplied
+from spindle_fem.operation.effect_terms import multiplied, operating_factors
 from spindle_fem.operation.operating_point import OperatingPoint
 
 Array = NDArray[np.float64]
@@ -239,7 +239,7 @@ class SteadyChanges:
 
     def parts(self, point: OperatingPoint, values: Mapping[str, float]) -> list[dict[str, float]]:
         """Factors that each term puts on coefficients at an operating point."""
-        return [self._part(term, point, values) for term in self.terms]
+        return self._parts(self.terms, point, values)
 
     def with_part(
         self,
@@ -249,16 +249,20 @@ class SteadyChanges:
         values: Mapping[str, float],
     ) -> list[dict[str, float]]:
         """The factors of all terms with those of one of them at other values."""
-        return [
-            self._part(own, point, values) if own is term else part
-            for own, part in zip(self.terms, parts, strict=True)
-        ]
+        if any(FLOW in part for part in parts):
+            # What one leaves of the flow, others follow.
+            return self.parts(point, values)
+        (moved,) = self._parts((term,), point, values)
+        return [moved if own is term else part for own, part in zip(self.terms, parts, strict=True)]
 
-    def _part(self, term: Term, point: OperatingPoint, values: Mapping[str, float]) -> dict[str, float]:
-        found = term.operating_factor(point, term.values(values))
-        for name in found:
-            if name not in self.known:
-                raise SpecError(f"term {term.name}", f'scales "{name}".', did_you_mean(name, self.known))
+    def _parts(
+        self, terms: Sequence[Term], point: OperatingPoint, values: Mapping[str, float]
+    ) -> list[dict[str, float]]:
+        found = operating_factors(terms, [term.values(values) for term in terms], point)
+        for term, part in zip(terms, found, strict=True):
+            for name in part:
+                if name not in self.known:
+                    raise SpecError(f"term {term.name}", f'scales "{name}".', did_you_mean(name, self.known))
         return found
 
     def capacities(self, values: Mapping[str, float]) -> dict[str, float]:
