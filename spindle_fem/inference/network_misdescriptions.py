@@ -18,8 +18,9 @@ from spindle_fem.model.reduced.network_operators import LINK
 Array = NDArray[np.float64]
 
 DAY = 86400.0
-# Modes of a room below this standard deviation, K, are left out; instants at which they are worked out.
-LEAST_MODE, MOST_INSTANTS = 0.05, 400
+# Modes of a room below this standard deviation, K, are left out; instants at which they are worked out, of a
+# recording and of a day at least, where the steps are as short.
+LEAST_MODE, INSTANTS, INSTANTS_OF_A_DAY = 0.05, 400, 4
 # Times that a small mass takes to follow its node, as shares of the node's own time constant.
 LAG_SHARES = {"soon": 0.02, "later": 0.15}
 
@@ -200,6 +201,12 @@ def room_modes(times: Array) -> list[tuple[float, Array]]:
     return found
 
 
+def room_instants(grid: Array) -> Array:
+    """Instants at which courses of a room are worked out, from the ends of a drive's steps [s]."""
+    number = max(INSTANTS, round(INSTANTS_OF_A_DAY * (grid[-1] - grid[0]) / DAY))
+    return np.linspace(grid[0], grid[-1], min(number, len(grid)))
+
+
 def network_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
     """Directions of a written network; widths in ``tuned``: ``MASS_BESIDE`` and what follows it."""
     if not predictor.is_network:
@@ -273,7 +280,7 @@ def network_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]:
             clock_change,
             number,
         )
-        times = np.linspace(drive.grid[0], drive.grid[-1], min(MOST_INSTANTS, len(drive.grid)))
+        times = room_instants(drive.grid)
         modes = room_modes(times)
         for boundary, driven in zip(network.boundary_names, network.boundary_input, strict=True):
             films = tuple(film for film, other in inputs.boundary_of.items() if other == boundary)

@@ -19,6 +19,7 @@ from spindle_fem.inference.network_misdescriptions import (
     OtherExponent,
     RoomCourse,
     TemperatureConductance,
+    room_instants,
     room_modes,
 )
 from spindle_fem.inference.opened_machine import open_machine, with_network
@@ -159,6 +160,17 @@ def test_a_room_has_a_day():
     total = np.sqrt(sum(size**2 * np.mean(shape**2) for size, shape in modes))
     assert total == pytest.approx(np.hypot(tuned.ROOM_DAILY, tuned.ROOM_SLOW), rel=0.1)
     assert len(room_modes(np.linspace(0.0, 3600.0, 100))) < 4
+
+
+def test_a_room_has_its_days_in_recordings_of_any_length():
+    """Half a day later it is as far to the other side, however many days there are."""
+    times = room_instants(np.linspace(0.0, 250 * 86400.0, 3000))
+    hours = np.arange(0.0, 250 * 86400.0, 3600.0)
+    course = np.array([size * np.interp(hours, times, shape) for size, shape in room_modes(times)])
+    later = np.sum(course[:, 12:] * course[:, :-12]) / np.sum(course[:, 12:] ** 2)
+    assert later == pytest.approx(-1.0, abs=0.05)
+    assert room_instants(np.linspace(0.0, 86400.0, 3000)).size == 400
+    assert room_instants(np.linspace(0.0, 86400.0, 300)).size == 300
 
 
 def test_the_same_directions_for_every_recording_of_a_machine(predictor):
