@@ -15,7 +15,8 @@ import numpy as np
 
 import spindle_fem.effects.catalogue as package
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.effects.framework.effect import Candidate, Effect, IntervalEffect, Intervals, Reading
+from spindle_fem.effects.framework.effect import Candidate, Effect, Reading
+from spindle_fem.effects.framework.interval_effect import IntervalEffect, Intervals
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Term, TermParameter
 from spindle_fem.effects.framework.unrecorded import EDGE_WIDTH
@@ -199,20 +200,36 @@ def fixed(candidate: Candidate, values: Mapping[str, float]) -> Candidate:
 
     return replace(
         candidate,
-        terms=tuple(_with_parameters(term, frozen(term.parameters)) for term in candidate.terms),
+        terms=tuple(_with(term, parameters=frozen(term.parameters)) for term in candidate.terms),
         factors=frozen(candidate.factors),
         reading=None
         if candidate.reading is None
-        else _with_parameters(candidate.reading, frozen(candidate.reading.parameters)),
+        else _with(candidate.reading, parameters=frozen(candidate.reading.parameters)),
         starts=({},),
         shift_of_prior=False,
     )
 
 
-def _with_parameters(owner: Owner, parameters: tuple[TermParameter, ...]) -> Owner:
+def in_recording(candidate: Candidate, number: int) -> Candidate:
+    """A candidate that consists of terms, in one recording only, with parameters of its own there.
+
+    What is on in intervals of one recording may be on in others of another.
+    """
+    own = tuple(_with(term, name=f"{term.name}.in_{number}") for term in candidate.terms)
+    names = dict(zip(candidate.parameters, (name for term in own for name in term.names()), strict=True))
+    return replace(
+        candidate,
+        terms=own,
+        amplitude=names[candidate.amplitude],
+        starts=tuple({names[name]: value for name, value in start.items()} for start in candidate.starts),
+        recording=number,
+    )
+
+
+def _with(owner: Owner, **changed: Any) -> Owner:
+    """A copy of a term or a reading with some of its attributes changed."""
     copy = object.__new__(type(owner))
-    copy.__dict__.update(owner.__dict__)
-    copy.parameters = parameters
+    copy.__dict__.update(owner.__dict__ | changed)
     return copy
 
 

@@ -8,13 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import (
-    Candidate,
-    Reported,
-    in_intervals,
-    place_words,
-    quantity,
-)
+from spindle_fem.effects.framework.effect import Candidate, Reported, place_words, quantity
+from spindle_fem.effects.framework.interval_effect import in_intervals
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
@@ -114,7 +109,8 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
         ]
     law = candidate.effect, followed_name(candidate)
     elsewhere = [c for c in fit.candidates if c is not candidate and (c.effect, followed_name(c)) == law]
-    words = "".join(f" It enters at {place_words(c.component)} as well." for c in elsewhere if law[1])
+    words = "".join(f" That is in {name} only." for name in _named(diagnosis, candidate).values())
+    words += "".join(f" It enters at {place_words(c.component)} as well." for c in elsewhere if law[1])
     if state is None and intervals:
         words += sizes_words([item["value"] for item in intervals], size_unit(parameters))
     elif state is not None:

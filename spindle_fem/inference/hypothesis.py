@@ -58,8 +58,8 @@ class Hypothesis:
         return 1.0 - min(1.0, self.course_share * (tuned.COARSE_COURSES if coarseness > 1.0 else 1.0))
 
     @property
-    def keys(self) -> frozenset[tuple[str, str]]:
-        """Effects and places."""
+    def keys(self) -> frozenset[tuple[str, str, int | None]]:
+        """Effects, places and recordings."""
         return self.fit.keys
 
 
@@ -83,5 +83,5 @@ class Ranked:
 
 
 def identity(candidates: Iterable[Candidate]) -> frozenset:
-    """Identity of a set of candidates: effects, places, forms and numbers of free parameters."""
-    return frozenset((c.effect, c.component, c.form, len(c.free)) for c in candidates)
+    """Identity of a set of candidates: effects, places, recordings, forms and numbers of free parameters."""
+    return frozenset((*c.key, c.form, len(c.free)) for c in candidates)

@@ -89,9 +89,9 @@ class Fit:
         return {c.name: c.at(u) for c, u in zip(self.coordinates, self.position, strict=True)}
 
     @property
-    def keys(self) -> frozenset[tuple[str, str]]:
-        """Effects with their places."""
-        return frozenset((c.effect, c.component) for c in self.candidates)
+    def keys(self) -> frozenset[tuple[str, str, int | None]]:
+        """Effects with their places and recordings."""
+        return frozenset(c.key for c in self.candidates)
 
     @property
     def named(self) -> tuple[Candidate, ...]:
@@ -110,9 +110,9 @@ class Fit:
         return tuple(c for c in self.candidates if not followed_name(c) or largest_like(c) is c)
 
     @property
-    def named_keys(self) -> frozenset[tuple[str, str]]:
-        """Effects with their places, of the members that are named."""
-        return frozenset((c.effect, c.component) for c in self.named)
+    def named_keys(self) -> frozenset[tuple[str, str, int | None]]:
+        """Effects with their places and recordings, of the members that are named."""
+        return frozenset(c.key for c in self.named)
 
     @property
     def reduced_misfit(self) -> float:

@@ -15,9 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import Candidate, Effect, IntervalEffect, in_intervals
+from spindle_fem.effects.framework.effect import Candidate, Effect
+from spindle_fem.effects.framework.interval_effect import IntervalEffect, in_intervals
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.unrecorded import EDGE_WIDTH
+from spindle_fem.effects.registry import in_recording
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import Variant, variants_of
 from spindle_fem.inference.coordinate_names import EFFECT_PREFIX
@@ -143,12 +145,13 @@ class Search:
         trust : Fit or None
             The fit that gains count from where that is another one.
         only_laws : bool
-            Whether to leave intervals out, which take most of the time.
+            Whether to leave intervals out, which take most of the time. They are looked for in recordings
+            in which nothing else is on in intervals.
         beside : sequence of Variant
             Screened as well.
         """
         families = self.families()
-        present = {(effect, families.get(component, component)) for effect, component in fit.keys}
+        present = {(effect, families.get(component, component)) for effect, component, _ in fit.keys}
         allowed = [
             c for c in self.candidates if (c.effect, families.get(c.component, c.component)) not in present
         ]
@@ -157,9 +160,10 @@ class Search:
             [replace(c, starts=self.effects[c.effect].starts_from(c, times, residual)) for c in allowed]
         )
         intervals, linear = {}, None
-        if not (only_laws or any(self.in_intervals(c) for c in fit.candidates)):
+        recordings = () if only_laws else self.without_intervals(fit)
+        if recordings:
             linear = LinearProblem.about(self.problem, fit, trust)
-            for found, candidate in self.interval_candidates(fit, linear):
+            for found, candidate in self.interval_candidates(fit, linear, recordings=recordings):
                 variant = Variant(candidate, {})
                 intervals[id(candidate)] = found
                 variants.append(variant)
@@ -182,14 +186,26 @@ class Search:
         known = recording.usable & predictor.use[0][:, None]
         return times, np.where(known, recording.temperature - at_stamps, np.nan)
 
+    def without_intervals(self, fit: Fit) -> tuple[int, ...]:
+        """Recordings in which a fit has nothing on in intervals."""
+        taken = {c.recording or 0 for c in fit.candidates if self.in_intervals(c)}
+        return tuple(n for n in range(len(self.problem.predictor.recordings)) if n not in taken)
+
     def interval_candidates(
-        self, fit: Fit, linear: LinearProblem | None = None, like: Candidate | None = None
+        self,
+        fit: Fit,
+        linear: LinearProblem | None = None,
+        like: Candidate | None = None,
+        recordings: Iterable[int] | None = None,
     ) -> Iterable[tuple[OnOff, Candidate]]:
         """Unrecorded heat or loss in intervals that explains what a fit leaves, the best spots first.
 
         ``linear`` is the problem about the fit, where that is known; with ``like`` only that effect at that
-        component.
+        component, in its recording; in some ``recordings``, all where absent.
         """
+        if recordings is None:
+            several = range(len(self.problem.predictor.recordings))
+            recordings = [n for n in several if like is None or like.recording in (None, n)]
         patterns = [
             (effect, pattern)
             for effect, pattern in self.patterns()
@@ -197,7 +213,7 @@ class Search:
             or (effect.name, self.view.component(pattern.spot)) == (like.effect, like.component)
         ]
         found: list[tuple[IntervalEffect, OnOff]] = []
-        for recording in range(len(self.problem.predictor.recordings)):
+        for recording in recordings:
             answers: list[Onsets] = onset_answers(
                 self.problem,
                 fit,
@@ -220,15 +236,17 @@ class Search:
             if item.gain > 0.0:
                 edges = self.edges(item.recording)
                 candidate = effect.over(self.view, item.pattern.spot, item.intervals, **edges)
-                several = len(self.problem.predictor.recordings) > 1
-                yield (
-                    item,
-                    replace(
-                        candidate,
-                        reference=max(item.strength, 1e-3),
-                        recording=item.recording if several else None,
-                    ),
-                )
+                yield item, self.of_recording(candidate, item.recording, item.strength)
+
+    def of_recording(self, candidate: Candidate, recording: int, size: float) -> Candidate:
+        """A candidate of about a size in one recording, which is the only one where there are several."""
+        sized = replace(candidate, reference=max(size, 1e-3))
+        return sized if len(self.problem.predictor.recordings) == 1 else in_recording(sized, recording)
+
+    def holds(self, fit: Fit, effect: str, spot: str, recording: int) -> bool:
+        """Whether a fit has an effect at a spot in a recording already."""
+        there = effect, self.view.component(spot)
+        return any(c.recording in (None, recording) for c in fit.candidates if c.key[:2] == there)
 
     @property
     def instants(self) -> int:
@@ -299,7 +317,7 @@ class Search:
         found = []
         for spot in [pattern.spot for other, pattern in self.patterns() if other.name == member.effect]:
             here = effect.over(self.view, spot, spans, **self.edges(member.recording or 0))
-            here = replace(here, reference=member.reference, recording=member.recording)
+            here = self.of_recording(here, member.recording or 0, member.reference)
             if identity((here,)) != identity((member,)):
                 self.remember_cost(here, cost)
                 found.append(

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from spindle_fem.effects.framework.effect import Candidate, IntervalEffect, in_intervals
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.interval_effect import IntervalEffect, in_intervals
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked
@@ -47,8 +48,8 @@ def leaves_unnamed(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[st
     What no law is known for is the answer where no law of the catalogue reads the same: beside one that
     does, it is the same heat or loss at the same place without its name.
     """
-    others = [c for c in fit.named if (c.effect, c.component) not in chosen.named_keys]
-    named = [c for c in chosen.named if (c.effect, c.component) not in fit.named_keys]
+    others = [c for c in fit.named if c.key not in chosen.named_keys]
+    named = [c for c in chosen.named if c.key not in fit.named_keys]
     if not len(others) == len(named) == 1:
         return False
     (other,), (law,) = others, named
@@ -67,22 +68,19 @@ def are_alike(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) 
 
 def holds(fit: Fit, chosen: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
     """Whether a set names every effect of another at the same or an overlapping place."""
-    left = [(c.effect, c.component) for c in chosen.named]
+    left = list(chosen.named)
     for candidate in fit.named:
         match = next(
             (
-                key
-                for key in left
-                if key[0] == candidate.effect
-                and (
-                    key[1] == candidate.component
-                    or candidate.component in overlapping.get(key[1], frozenset())
-                )
+                own
+                for own in left
+                if own.effect == candidate.effect
+                and candidate.component in {own.component, *overlapping.get(own.component, ())}
+                and own.meets(candidate)
             ),
             None,
         )
-        if match is not None:
-            left.remove(match)
+        left = [own for own in left if own is not match]
     return not left
 
 
@@ -92,10 +90,10 @@ def odds_needed(fit: Fit, fewer: Fit, overlapping: Mapping[str, frozenset[str]])
     Laws are not exact, and what one leaves another fits, most of all one of the same place: of the same
     bearings, or of the same face.
     """
-    further = next(c for c in fit.named if (c.effect, c.component) not in fewer.named_keys)
+    further = next(c for c in fit.named if c.key not in fewer.named_keys)
     places = {further.component, *overlapping.get(further.component, ())}
     laws = [c for c in fewer.named if "sensor" not in (c.kind, further.kind)]
-    beside_itself = any(law.component in places for law in laws)
+    beside_itself = any(law.component in places and law.meets(further) for law in laws)
     return tuned.FURTHER_AT_ITS_PLACE if beside_itself else tuned.FURTHER_EFFECT
 
 
@@ -181,7 +179,8 @@ def told_by_readings(chosen: Hypothesis, other: Hypothesis, coarseness: float) -
 def _repeats(fit: Fit, other: Fit) -> bool:
     """Whether a set is another but for one effect, whose law can be that of the other at its place."""
     own, theirs = fit.named_keys - other.named_keys, other.named_keys - fit.named_keys
-    return len(own) == 1 and theirs == {(effect_of(effect).repeats, place) for effect, place in own}
+    repeated = {(effect_of(effect).repeats, place) for effect, place, _ in own}
+    return len(own) == len(theirs) == 1 and {(effect, place) for effect, place, _ in theirs} == repeated
 
 
 def as_one(

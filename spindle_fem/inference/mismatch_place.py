@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from spindle_fem.effects.framework.effect import Candidate, IntervalEffect
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.interval_effect import IntervalEffect
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis_fit import Fit, candidate_coordinates

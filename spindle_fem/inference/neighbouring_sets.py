@@ -33,7 +33,7 @@ def widened(search: Search) -> None:
             for wider in _sets_of(search, candidate):
                 members = list(hypothesis.fit.candidates)
                 members[position] = wider
-                if len({(c.effect, c.component) for c in members}) < len(members):
+                if len({c.key for c in members}) < len(members):
                     continue
                 # The bearing's values are a start for the set, whose names differ.
                 values = hypothesis.fit.values
@@ -212,7 +212,7 @@ def at_other_spots(
     for found, candidate in search.interval_candidates(left):
         if len(tasks) == tuned.OTHER_SPOTS:
             break
-        if identity((*rest, candidate)) not in search.found:
+        if candidate.key not in {c.key for c in rest} and identity((*rest, candidate)) not in search.found:
             tasks.append(search.task(left, [(Variant(candidate, {}), 1.0)], {id(candidate): found}))
     return tasks
 

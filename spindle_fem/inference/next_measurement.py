@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from spindle_fem.effects.framework.effect import in_intervals, place_words
+from spindle_fem.effects.framework.effect import place_words
+from spindle_fem.effects.framework.interval_effect import in_intervals
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
 from spindle_fem.inference.further_tests import (
@@ -42,6 +43,7 @@ from spindle_fem.inference.hypothesis import Ranked
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit
 from spindle_fem.inference.reading_noise import SlowError, key_of
 from spindle_fem.inference.set_odds import rank
+from spindle_fem.recordings.align import Recording
 from spindle_fem.units import ZERO_CELSIUS_K
 
 if TYPE_CHECKING:
@@ -125,6 +127,7 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
         (bits), ``between`` and ``options``: the proposed one, then the most informative first.
     """
     rivals, weights, decided = rivals_of(diagnosis)
+    between = [hypothesis_words(item.fit, diagnosis.predictor.recordings) for item in rivals]
     if len(rivals) < 2:
         return {
             "where": EXISTING,
@@ -134,11 +137,10 @@ def next_measurement(diagnosis: Diagnosis) -> dict[str, Any]:
             if diagnosis.judgement.verdict == "unexplained"
             else "No other explanation came near: another recording would test this one.",
             "expected_information": 0.0,
-            "between": [hypothesis_words(item.fit) for item in rivals],
+            "between": between,
             "options": [],
         }
     options, failed = evaluate(diagnosis, [item.fit for item in rivals], weights)
-    between = [hypothesis_words(item.fit) for item in rivals]
     if not options:
         return {
             "where": EXISTING,
@@ -191,18 +193,22 @@ def rivals_of(diagnosis: Diagnosis) -> tuple[list[Ranked], Array, bool]:
     return found, weights / weights.sum(), decided
 
 
-def hypothesis_words(fit: Fit) -> str:
+def hypothesis_words(fit: Fit, recordings: Sequence[Recording]) -> str:
     """A set of effects in words.
 
     >>> from types import SimpleNamespace
-    >>> item = SimpleNamespace(effect="heat_scale", component="front_bearings")
-    >>> hypothesis_words(SimpleNamespace(candidates=(item,)))
-    'heat scale at the front bearings'
+    >>> one, other = (SimpleNamespace(effect="windage", component="shaft", recording=n) for n in (None, 1))
+    >>> runs = [SimpleNamespace(name="monday"), SimpleNamespace(name="tuesday")]
+    >>> hypothesis_words(SimpleNamespace(candidates=(one, other)), runs)
+    'windage at the shaft with windage at the shaft in tuesday'
     """
     if not fit.candidates:
         return "nothing missing"
-    names = [f"{c.effect.replace('_', ' ')} at {place_words(c.component)}" for c in fit.candidates]
-    return " with ".join(names)
+    return " with ".join(
+        f"{c.effect.replace('_', ' ')} at {place_words(c.component)}"
+        + ("" if c.recording is None else f" in {recordings[c.recording].name}")
+        for c in fit.candidates
+    )
 
 
 def evaluate(

@@ -116,13 +116,13 @@ class Screened:
             1 to 3; triples extend the best pairs.
         """
         sets, gain = self._evaluated(size)
-        found: dict[frozenset[tuple[str, str]], tuple[tuple[int, ...], float]] = {}
+        found: dict[frozenset[tuple[str, str, int | None]], tuple[tuple[int, ...], float]] = {}
         places: dict[tuple[str, ...], int] = {}
         for index in np.argsort(-gain):
             if not np.isfinite(gain[index]):
                 break
             members = tuple(int(i) for i in sets[index])
-            key = frozenset(self.variants[i].key for i in members)
+            key = frozenset(self.variants[i].candidate.key for i in members)
             effects = tuple(sorted(self.variants[i].candidate.effect for i in members))
             # One effect at many places must not crowd out the others.
             if key not in found and places.get(effects, 0) < tuned.PLACES_OF_ONE_EFFECT:
@@ -170,29 +170,31 @@ class Screened:
         return sets[chosen]
 
     def best_of(self, allowed: Callable[[Candidate], bool], number: int) -> list[int]:
-        """Best variant of each effect and form at each place, among those allowed."""
+        """Best variant of each effect and form at each place in each recording, among those allowed."""
         gain = self.singles()
-        found: dict[tuple[str, str, str], int] = {}
+        found: dict[tuple, int] = {}
         for index in np.argsort(-gain):
             candidate = self.variants[index].candidate
             if not np.isfinite(gain[index]) or len(found) == number:
                 break
             if allowed(candidate):
-                found.setdefault((candidate.effect, candidate.component, candidate.form), int(index))
+                found.setdefault((*candidate.key, candidate.form), int(index))
         return list(found.values())
 
     def _distinct(self, sets: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Sets of different candidates, no two of one effect at one place or in one family."""
+        """Sets of different candidates, in no recording two of one effect at one place or in one family."""
         keys = [
             (effect, self.families.get(component, component))
             for effect, component in (v.key for v in self.variants)
         ]
         names = {key: i for i, key in enumerate(dict.fromkeys(keys))}
         label = np.array([names[key] for key in keys])[sets]
+        own = np.array([-1 if (n := v.candidate.recording) is None else n for v in self.variants])[sets]
         keep = np.ones(len(sets), dtype=bool)
         for i in range(sets.shape[1]):
             for j in range(i):
-                keep &= label[:, i] != label[:, j]
+                apart = (own[:, i] != own[:, j]) & (own[:, i] >= 0) & (own[:, j] >= 0)
+                keep &= (label[:, i] != label[:, j]) | apart
         return keep
 
 

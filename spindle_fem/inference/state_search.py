@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import Candidate, IntervalEffect
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.interval_effect import IntervalEffect
 from spindle_fem.effects.framework.unrecorded import STATES
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
@@ -93,7 +94,7 @@ def add_states(search: Search, fit: Fit, number: int = tuned.STATE_PLACES) -> No
     bases = [BaseRun(problem.predictor, n, fit.values, fit.candidates) for n in recordings]
     found: list[tuple[float, StatePlace, Course]] = []
     for place in state_places(search):
-        if (place.effect.name, search.view.component(place.pattern.spot)) in fit.keys:
+        if search.holds(fit, place.effect.name, place.pattern.spot, place.recording):
             continue
         courses = _courses(search, bases[place.recording], readings[place.recording], place)
         found += [(course.log_evidence, place, course) for course in courses]
@@ -493,5 +494,4 @@ def _candidate(
     found = place.effect.over(
         search.view, place.pattern.spot, intervals, course=STATES, sizes=shares, blurred=blurred
     )
-    recording = place.recording if len(search.problem.predictor.recordings) > 1 else None
-    return replace(found, reference=max(size, 1e-3), recording=recording)
+    return search.of_recording(found, place.recording, size)

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import Candidate, IntervalEffect
+from spindle_fem.effects.framework.effect import Candidate
+from spindle_fem.effects.framework.interval_effect import IntervalEffect
 from spindle_fem.effects.framework.unrecorded import LESS, PULSES, STEPS
 from spindle_fem.effects.registry import fixed
 from spindle_fem.inference import tuned
@@ -71,12 +72,12 @@ def add_steps(search: Search, fit: Fit) -> None:
         return
     predictor = search.problem.predictor
     found = []
-    patterns = [
-        (effect, pattern)
-        for effect, pattern in search.patterns(levels=True)
-        if (effect.name, search.view.component(pattern.spot)) not in fit.keys
-    ]
     for recording in range(len(predictor.recordings)):
+        patterns = [
+            (effect, pattern)
+            for effect, pattern in search.patterns(levels=True)
+            if not search.holds(fit, effect.name, pattern.spot, recording)
+        ]
         answers = onset_answers(
             search.problem,
             fit,
@@ -348,7 +349,6 @@ def _candidate(
     search: Search, place: StepPlace, intervals: Sequence[tuple[float, float]], levels: Sequence[float]
 ) -> Candidate:
     mean = float(np.average(levels, weights=[end - start for start, end in intervals]))
-    several = len(search.problem.predictor.recordings) > 1
     alike = len(intervals) == 1
     found = place.effect.over(
         search.view,
@@ -359,7 +359,7 @@ def _candidate(
         sizes=() if alike else [level / mean for level in levels],
         **search.edges(place.recording),
     )
-    return replace(found, reference=max(mean, 1e-3), recording=place.recording if several else None)
+    return search.of_recording(found, place.recording, mean)
 
 
 def _spread(search: Search, effect: IntervalEffect, pattern: Pattern) -> float:

@@ -14,7 +14,7 @@ from spindle_fem.library.loaded_machine import Machine, Progress, definition_fil
 from spindle_fem.recordings.align import Recording
 from spindle_fem.report.diagnosis_charts import residual_map
 from spindle_fem.report.diagnosis_odds import set_probabilities
-from spindle_fem.report.diagnosis_words import heldout_errors
+from spindle_fem.report.diagnosis_words import heldout_errors, in_recording
 from spindle_fem.report.read_against_predicted import before_after, displaced_before_after
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class MachineDiagnosis(FolderResult):
         return self.folder / str(self["improved_model"])
 
     def _headline(self) -> str:
-        named = [f"{item['effect']} ({item['component']})" for item in self["findings"]]
+        named = [f"{item['effect']} ({item['component']}{in_recording(item)})" for item in self["findings"]]
         return ": ".join(filter(None, (self["verdict"], ", ".join(named))))
 
     def _rows(self) -> Mapping[str, str]:

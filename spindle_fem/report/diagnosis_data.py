@@ -266,7 +266,7 @@ def _sets(diagnosis: Diagnosis) -> dict[str, Any]:
     fits = [item.fit for item in told]
     fits += [fit for fit in others if not any(are_alike(fit, one.fit, overlapping) for one in told)]
     return {
-        "set_name": ("set", [hypothesis_words(fit) for fit in fits]),
+        "set_name": ("set", [hypothesis_words(fit, diagnosis.predictor.recordings) for fit in fits]),
         "set_probability": (
             "set",
             np.array([stated.get(fit.keys, 0.0) for fit in fits]),

@@ -13,6 +13,7 @@ from matplotlib.patches import Rectangle
 
 from spindle_fem.effects.framework.effect import capital
 from spindle_fem.report.diagnosis_charts import NORMAL_90
+from spindle_fem.report.diagnosis_words import in_recording
 from spindle_fem.report.figure_style import CYCLE, INK, MUTED, new_figure, pixel_axes, set_title, styled
 from spindle_fem.report.parameter_words import parameter_words, worth_showing
 from spindle_fem.report.read_against_predicted import HELD
@@ -106,7 +107,8 @@ def finding_intervals(findings: Sequence[Mapping[str, Any]], what: str = "what w
         axes.spines["left"].set_visible(False)
         total = figure.get_size_inches()[1] * figure.dpi
         y = 1.0 - (top + 12.0) / total
-        label = f"{item['effect'].replace('_', ' ')} ({item['component'].replace('_', ' ')}): "
+        place = item["component"].replace("_", " ") + in_recording(item)
+        label = f"{item['effect'].replace('_', ' ')} ({place}): "
         figure.text(640.0 / 1600.0, y, label + name.replace("_", " "), ha="right", va="center", fontsize=9.0)
         unit = str(value["unit"]).replace("degC", "°C")
         value_text, low_text, high_text = with_interval(middle, low, high)

@@ -14,6 +14,7 @@ from spindle_fem.report.diagnosis_words import (
     fit_rows,
     found_words,
     heldout_errors,
+    in_recording,
     is_one_fit,
     kelvin,
     level_of,
@@ -161,7 +162,7 @@ def set_tables(content: Mapping[str, Any]) -> list[Any]:
     """Parameters, intervals and alternatives."""
     effect = (
         words("effect", lambda item: plain(item["effect"])),
-        words("place", lambda item: plain(item["component"])),
+        words("place", lambda item: plain(item["component"]) + in_recording(item)),
     )
     parameters = [
         {**item, **value, "parameter": plain(name)}

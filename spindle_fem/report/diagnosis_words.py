@@ -121,8 +121,19 @@ def set_words(findings: Sequence[Mapping[str, Any]]) -> str:
     if not findings:
         return "nothing missing"
     return " with ".join(
-        f"{item['effect'].replace('_', ' ')} at {place_words(item['component'])}" for item in findings
+        f"{item['effect'].replace('_', ' ')} at {place_words(item['component'])}{in_recording(item)}"
+        for item in findings
     )
+
+
+def in_recording(finding: Mapping[str, Any]) -> str:
+    """The one of several recordings that a finding is of, behind a place; empty if it is of all.
+
+    >>> in_recording({"intervals": [{"start": 0.0, "end": 60.0, "recording": "monday"}]})
+    ' in monday'
+    """
+    named = (item["recording"] for item in finding.get("intervals", ()) if "recording" in item)
+    return next((f" in {name}" for name in named), "")
 
 
 def misdescription_words(row: Mapping[str, Any]) -> str:

@@ -188,7 +188,7 @@ def test_heat_of_one_law_at_two_spots_is_one_set_named_at_the_larger():
     large, small = heat("housing", 2.0), heat("SP04", 0.1)
     one, two = fitted(large), fitted(small, large)
     assert two.named == (large[0],)
-    assert two.named_keys == one.named_keys == {("unrecorded_heat_source", "housing")}
+    assert two.named_keys == one.named_keys == {("unrecorded_heat_source", "housing", None)}
     assert are_alike(one, two, {})
     other = fitted(large, (replace(small[0], form="SP04 following load"), 0.1))
     assert len(other.named) == 2

@@ -9,7 +9,7 @@ import pytest
 from spindle_fem.commands.diagnose_command import diagnose_without_report
 from spindle_fem.commands.plan_command import _as_recorded, _of_recording, plan, planned_measurement
 from spindle_fem.definition.load import load_machine
-from spindle_fem.effects.framework.effect import in_intervals
+from spindle_fem.effects.framework.interval_effect import in_intervals
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.errors import BadInputError, FaultsError, SpecError
 from spindle_fem.inference import measurement_plan, misdescription_columns, opened_machine

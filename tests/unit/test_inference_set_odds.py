@@ -24,7 +24,7 @@ def test_probabilities_of_sets_add_up_over_their_forms():
     empty = hypothesis(misfit=400.0, evidence=-300.0)
     ranked = rank([first, rival, second, empty])
     assert ranked[0].probability == pytest.approx(2.0 / 3.0, rel=1e-6)
-    assert ranked[0].fit.keys == {("thermal_preload", "front_bearings")}
+    assert ranked[0].fit.keys == {("thermal_preload", "front_bearings", None)}
     assert sum(item.probability for item in ranked) == pytest.approx(1.0)
     assert [item.probability for item in ranked] == sorted((i.probability for i in ranked), reverse=True)
 

@@ -26,8 +26,8 @@ from tests.support.made_hypotheses import (
     verdict,
 )
 
-PRELOAD_KEY = frozenset({("thermal_preload", "front_bearings")})
-CHURNING_KEY = frozenset({("grease_churning", "front_bearings")})
+PRELOAD_KEY = frozenset({("thermal_preload", "front_bearings", None)})
+CHURNING_KEY = frozenset({("grease_churning", "front_bearings", None)})
 
 
 # ---------------------------------------------------------------------- detection

@@ -53,7 +53,7 @@ def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):
     assert wrong.component not in {c.component for members, _ in others for c in members}
     assert len(others) < tuned.OTHER_SPOTS
     exchanged(search)
-    assert search.ranked()[0].keys == {("unrecorded_heat_source", "front_bearings")}
+    assert search.ranked()[0].keys == {("unrecorded_heat_source", "front_bearings", None)}
 
 
 def test_what_is_on_in_intervals_is_tried_in_the_same_ones_at_every_other_spot(case, heated):
@@ -90,8 +90,8 @@ def test_heat_in_intervals_is_tried_in_the_place_of_a_law_beside_others(case, he
         score = 0.0 if len(candidates) == 2 else -1e4
         search.keep(Hypothesis(search.problem.fit(candidates), score))
     exchanged(search)
-    heat = ("unrecorded_heat_source", "front_bearings")
-    found = next(h for h in search.found.values() if h.keys == {SEAT, heat})
+    heat = ("unrecorded_heat_source", "front_bearings", None)
+    found = next(h for h in search.found.values() if h.keys == {(*SEAT, None), heat})
     both = next(h for h in search.found.values() if h.fit.candidates == (seat, preload))
     assert found.fit.misfit_with_prior < both.fit.misfit_with_prior
 
@@ -106,10 +106,10 @@ def test_what_reads_like_a_member_is_tried_in_its_place(case):
     best = search.ranked()[0]
     exchanged(search)
     tried = {h.keys: h.fit.misfit_with_prior for h in search.found.values()}
-    assert tried[frozenset({air})] < best.fit.misfit_with_prior + tuned.NEAR_MISFIT
+    assert tried[frozenset({(*air, None)})] < best.fit.misfit_with_prior + tuned.NEAR_MISFIT
     # Nothing that promises far less, nor the member once more.
     assert len(tried) <= 2 + tuned.EFFECTS_EXCHANGED
-    assert frozenset({("heat_split", "rear_bearings")}) not in tried
+    assert frozenset({("heat_split", "rear_bearings", None)}) not in tried
 
 
 def test_all_that_a_lying_sensor_may_do_is_tried_in_the_place_of_what_was_found(case, heated):
@@ -164,7 +164,7 @@ def test_a_channel_that_is_early_is_not_tried_as_a_slow_sensor(case, heated):
 
 def test_places_of_one_combination_hide_no_other_nor_bearings_of_a_set_another_place():
     def at(effect, place):
-        own = SimpleNamespace(effect=effect, component=place)
+        own = SimpleNamespace(effect=effect, component=place, meets=lambda other: True)
         return SimpleNamespace(fit=SimpleNamespace(candidates=(own,), named=(own,)))
 
     few, alike = tuned.REFITTED_OF_EACH, tuned.REFITTED_ALIKE

@@ -14,14 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from spindle_fem.effects.framework.effect import (
-    Candidate,
-    IntervalEffect,
-    Intervals,
-    Reported,
-    quantity,
-    stated,
-)
+from spindle_fem.effects.framework.effect import Candidate, Reported, quantity, stated
+from spindle_fem.effects.framework.interval_effect import IntervalEffect, Intervals
 from spindle_fem.effects.framework.laws import Complex, linear, power, relaxed, rows, shape, switched
 from spindle_fem.effects.framework.machine_view import MachineView, RecordedQuantity
 from spindle_fem.effects.framework.spread import Spread

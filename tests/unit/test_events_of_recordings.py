@@ -1,0 +1,97 @@
+"""What is on in intervals of one of several recordings, beside the same kind in another."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spindle_fem.effects.registry import catalogue, interval_effects
+from spindle_fem.inference.candidate_response import Variant
+from spindle_fem.inference.hypothesis import identity
+from spindle_fem.inference.hypothesis_fit import Problem
+from spindle_fem.inference.hypothesis_search import Search
+from spindle_fem.inference.like_sets import are_alike, odds_needed
+from spindle_fem.inference.opened_machine import open_machine
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.prepared_problem import calibrate
+from spindle_fem.inference.screening import screen
+from spindle_fem.recordings.align import read_recording
+from tests.support.flawed_network import MACHINE, as_built, record
+from tests.support.made_hypotheses import candidate, hypothesis
+
+TIMES = np.arange(0.0, 6001.0, 60.0)
+ON = ((1800.0, 3000.0), (3600.0, 4800.0))
+
+
+@pytest.fixture(scope="module")
+def search(tmp_path_factory):
+    """A search that has not begun, on two recordings with heat of the body at different times."""
+    folder = tmp_path_factory.mktemp("two")
+    (folder / "drive.toml").write_text(MACHINE)
+    runs = []
+    for number, (start, end) in enumerate(ON):
+        heat = lambda time, start=start, end=end: 40.0 if start <= time < end else 0.0  # noqa: E731
+        run = record(folder / f"run{number}", number, built=as_built(7), times=TIMES, extra=heat)
+        runs.append(read_recording(run))
+    machine = open_machine(folder / "drive.toml", (), runs, [])
+    predictor = Predictor(machine.fast, machine.recordings)
+    calibrated = calibrate(None, predictor)
+    problem = Problem(predictor, calibrated.known, calibrated.slow, predictor.observations)
+    effects = catalogue()
+    weights = {name: effect.prior_weight for name, effect in effects.items()}
+    return Search(problem, machine.view, effects, (), interval_effects(), weights, found={})
+
+
+def heat_in(search, number):
+    effect = search.effects["unrecorded_heat_source"]
+    return search.of_recording(effect.over(search.view, "body", [ON[number]]), number, 40.0)
+
+
+def test_two_of_a_kind_in_two_recordings_have_values_of_their_own(search):
+    first, second = heat_in(search, 0), heat_in(search, 1)
+    assert not first.parameters.keys() & second.parameters.keys()
+    assert identity((first,)) != identity((second,))
+    predictor = search.problem.predictor
+    both = {first.amplitude: 40.0, second.amplitude: 20.0}
+    for number, (own, size) in enumerate(((first, 40.0), (second, 20.0))):
+        together = predictor.predict(number, both, (first, second)).temperature
+        alone = predictor.predict(number, {own.amplitude: size}, (own,)).temperature
+        np.testing.assert_array_equal(together, alone)
+    fit = search.problem.fit((first, second), both)
+    assert len(fit.keys) == 2
+    assert [fit.values[c.amplitude] for c in (first, second)] == pytest.approx([40.0, 40.0], rel=0.1)
+
+
+def test_intervals_are_sought_in_recordings_that_have_none(search):
+    first = heat_in(search, 0)
+    fit = search.problem.fit((first,), {first.amplitude: 40.0})
+    assert search.without_intervals(fit) == (1,)
+    screened, intervals = search.screened(fit)
+    assert {item.recording for item in intervals.values()} == {1}
+    (best,), _ = screened.best(1, 1)[0]
+    found = screened.variants[best].candidate
+    assert found.key == ("unrecorded_heat_source", "body", 1)
+    assert [search.holds(fit, "unrecorded_heat_source", "body", number) for number in (0, 1)] == [True, False]
+    both = search.problem.fit((first, heat_in(search, 1)))
+    assert search.without_intervals(both) == ()
+    assert not search.screened(both)[1]
+
+
+def test_one_kind_at_one_place_makes_a_pair_in_two_recordings_only(search):
+    first, second = heat_in(search, 0), heat_in(search, 1)
+    everywhere = search.effects["unrecorded_heat_source"].over(search.view, "body", [ON[0]])
+    variants = [Variant(c, {}) for c in (first, second, heat_in(search, 0), everywhere)]
+    screened = screen(search.problem, search.problem.fit(), variants, search.weights, {})
+    assert {tuple(members) for members in screened._sets(2)} == {(0, 1), (1, 2)}
+
+
+def test_sets_of_two_recordings_are_not_alike_and_need_no_odds_of_one_place():
+    none, first, second = (replace(candidate("windage"), recording=number) for number in (None, 0, 1))
+    alone, other, both, law = (
+        hypothesis(*members, misfit=400.0).fit for members in ((first,), (second,), (first, second), (none,))
+    )
+    assert not are_alike(alone, other, {})
+    assert not are_alike(alone, both, {})
+    assert are_alike(alone, law, {})
+    beside = hypothesis(first, candidate("radiation"), misfit=400.0).fit
+    assert odds_needed(both, alone, {}) < odds_needed(beside, alone, {})
