@@ -54,6 +54,8 @@ Progress = Callable[[str], None]
 
 # Intervals of unrecorded heat or cooling that represent all others, as shares of the test.
 INTERVALS = ((0.0, 1.0), (0.05, 0.35), (0.2, 0.5), (0.35, 0.65), (0.5, 0.8), (0.65, 0.95), (0.4, 0.95))
+# Parameters of laws that are instants.
+INSTANTS = ("start", "time", "middle")
 # Prior of nothing missing over that of one effect.
 NOTHING = tuned.NUMBER_PRIOR[0] / tuned.NUMBER_PRIOR[1]
 # Sizes beyond this multiple of the usual one are not reported: first-order responses do not cover them.
@@ -206,9 +208,10 @@ def plan_measurement(
     laws = variants_of(candidates)
 
     def variants_in(number: int) -> list[Variant]:
-        # Tests that are compared may be shorter than the asked one: intervals are shares of each.
+        # Tests that are compared may be shorter than the asked one: moments are shares of each.
         duration = float(np.ptp(machine.recordings[number].times))
-        return laws + variants_of(_interval_candidates(machine.view, duration))
+        own = [_begun_within(law, duration / machine.view.duration) for law in laws]
+        return own + variants_of(_interval_candidates(machine.view, duration))
 
     variants = variants_in(0)
     forms, hypotheticals = _forms(variants)
@@ -268,6 +271,16 @@ def plan_measurement(
         tuple(sorted(tests, key=lambda item: -item.information)),
         tuple(failed),
     )
+
+
+def _begun_within(law: Variant, share: float) -> Variant:
+    """A law whose instants are a share of what they are in the longest test."""
+    moved = {
+        name: share * law.shape.get(name, item.value)
+        for name, item in law.candidate.parameters.items()
+        if item.name in INSTANTS and item.unit == "s"
+    }
+    return replace(law, shape={**law.shape, **moved}) if moved else law
 
 
 def _interval_candidates(view: MachineView, duration: float) -> list[Candidate]:

@@ -59,6 +59,7 @@ def told_from(found, first, second):
     return float(found.plan.separation.told_from[items.index(first), items.index(second)])
 
 
+INSTANTS = {"time", "start", "middle"}
 HEAT_AT_A, HEAT_AT_B = ("unrecorded_heat_source", "a"), ("unrecorded_heat_source", "b")
 
 
@@ -75,14 +76,18 @@ def test_heat_at_two_bodies_is_told_apart_once_each_is_read(machine):
     assert one.plan.sensors_in_turn[0].information == pytest.approx(both.plan.asked.information, rel=0.1)
 
 
-def test_intervals_lie_within_each_test_that_is_compared(machine, monkeypatch):
-    sizes, products = [], measurement_plan._products
+def test_intervals_and_instants_lie_within_each_test_that_is_compared(machine, monkeypatch):
+    sizes, begun, products = [], [], measurement_plan._products
 
     def kept(problem, number, variants, *further):
         found = products(problem, number, variants, *further)
         own = [(i, item.candidate) for i, item in enumerate(variants) if item.key == HEAT_AT_A]
         timed = [i for i, candidate in own if in_intervals(effect_of(candidate.effect), candidate)]
-        sizes.append(np.einsum("cii->i", found.effects)[timed])
+        seen = np.einsum("cii->i", found.effects)
+        sizes.append(seen[timed])
+        drifts = [i for i, item in enumerate(variants) if item.key[0] in ("sensor_drift", "ambient_drift")]
+        laws = [i for i in drifts if INSTANTS & {name.rpartition(".")[2] for name in variants[i].shape}]
+        begun.append(seen[laws])
         return found
 
     monkeypatch.setattr(measurement_plan, "_products", kept)
@@ -90,6 +95,9 @@ def test_intervals_lie_within_each_test_that_is_compared(machine, monkeypatch):
     # The asked test of 24 h, then those of 8 h, in which heat after their end would move nothing.
     assert np.shape(sizes) == (5, len(measurement_plan.INTERVALS))
     assert np.min(sizes) > 100.0
+    # Laws of a sensor and of the room that begin or come at an instant likewise.
+    assert np.shape(begun) == (5, 2 * 4 + 17)
+    assert np.min(begun) > 0.5
 
 
 def test_offset_of_a_sensor_is_seen_from_the_size_that_noise_leaves(machine):
