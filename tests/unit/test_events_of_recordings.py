@@ -1,21 +1,26 @@
 """What is on in intervals of one of several recordings, beside the same kind in another."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from spindle_fem.effects.registry import catalogue, interval_effects
+from spindle_fem.effects.registry import catalogue, effect_of, interval_effects
 from spindle_fem.inference.candidate_response import Variant
+from spindle_fem.inference.diagnosis import diagnose_recordings, overlapping_components
+from spindle_fem.inference.findings import predictions_at_stamps
 from spindle_fem.inference.hypothesis import identity
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.like_sets import are_alike, odds_needed
-from spindle_fem.inference.opened_machine import open_machine
+from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate
 from spindle_fem.inference.screening import screen
+from spindle_fem.model.reduced.defined_effects import NO_EFFECTS
 from spindle_fem.recordings.align import read_recording
+from tests.support.diagnosed_spindle import Case, written
 from tests.support.flawed_network import MACHINE, as_built, record
 from tests.support.made_hypotheses import candidate, hypothesis
 
@@ -95,3 +100,27 @@ def test_sets_of_two_recordings_are_not_alike_and_need_no_odds_of_one_place():
     assert are_alike(alone, law, {})
     beside = hypothesis(first, candidate("radiation"), misfit=400.0).fit
     assert odds_needed(both, alone, {}) < odds_needed(beside, alone, {})
+
+
+@pytest.mark.slow
+def test_heat_of_one_bearing_set_at_other_times_in_each_recording_of_a_spindle(tmp_path):
+    """On a machine with geometry intervals are sought by screening alone."""
+    case, recordings = Case(tmp_path), []
+    for number, on in enumerate(((3000.0, 5000.0), (6000.0, 8000.0))):
+        heat = effect_of("unrecorded_heat_source").over(case.view, "front_bearings", [on])
+        predictor = Predictor(case.fast, [case.blank])
+        read = predictions_at_stamps(
+            predictor, SimpleNamespace(values={heat.amplitude: 200.0}, candidates=(heat,))
+        )[0]
+        noise = np.random.default_rng(number).normal(0.0, 0.1, read.shape)
+        recordings.append(replace(written(tmp_path, read - 273.15 + noise), name=f"run{number}"))
+    machine = DiagnosedMachine("lumped", case.spec, case.fast, NO_EFFECTS, case.view, tuple(recordings), ())
+    found = diagnose_recordings(machine)
+    assert found.judgement.verdict == "missing_physics"
+    assert {(c.effect, c.recording) for c in found.final.candidates} == {
+        ("unrecorded_heat_source", 0),
+        ("unrecorded_heat_source", 1),
+    }
+    # One bearing of the set or all of it: sensors do not tell.
+    front = overlapping_components(case.view)["front_bearings"]
+    assert {c.component for c in found.final.candidates} <= front
