@@ -19,6 +19,7 @@ from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.candidate_response import variants_of
 from spindle_fem.inference.final_fits import fitted_sets, likelier_about, to_be_fitted
 from spindle_fem.inference.followed_readings import Followed, FollowedReadings
+from spindle_fem.inference.followed_states import InferredState, inferred_states, states_on_rows
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import NOT_SIMULATED, Fit, Problem
@@ -40,7 +41,6 @@ from spindle_fem.inference.search_basis import acted_on, on_smaller_bases, small
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.set_odds import rank
 from spindle_fem.inference.set_problems import SetProblems, combination_of
-from spindle_fem.inference.state_search import InferredState, inferred_states, states_on_rows
 from spindle_fem.inference.verdict import Judgement, judge
 from spindle_fem.inference.worker_processes import Workers
 from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction

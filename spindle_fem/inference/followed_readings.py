@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import GivenUp
+from spindle_fem.inference.followed_states import InferredState
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.input_sampling import error_over_noise, left_over_noise
@@ -18,7 +19,6 @@ from spindle_fem.inference.like_sets import only_size_free
 from spindle_fem.inference.observations import Observation
 from spindle_fem.inference.reading_noise import ChannelBins
 from spindle_fem.inference.set_problems import SetProblems
-from spindle_fem.inference.state_search import InferredState
 from spindle_fem.inference.unseen_moments import unread_changes, unseen_moments
 from spindle_fem.inference.worker_processes import Workers, of_candidates
 

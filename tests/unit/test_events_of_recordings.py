@@ -10,6 +10,7 @@ from spindle_fem.effects.registry import catalogue, effect_of, interval_effects
 from spindle_fem.inference.candidate_response import Variant
 from spindle_fem.inference.diagnosis import diagnose_recordings, overlapping_components
 from spindle_fem.inference.findings import predictions_at_stamps
+from spindle_fem.inference.followed_states import inferred_states
 from spindle_fem.inference.hypothesis import identity
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.hypothesis_search import Search
@@ -29,8 +30,8 @@ ON = ((1800.0, 3000.0), (3600.0, 4800.0))
 
 
 @pytest.fixture(scope="module")
-def search(tmp_path_factory):
-    """A search that has not begun, on two recordings with heat of the body at different times."""
+def machine(tmp_path_factory):
+    """With two recordings in which the body is heated at different times."""
     folder = tmp_path_factory.mktemp("two")
     (folder / "drive.toml").write_text(MACHINE)
     runs = []
@@ -38,8 +39,12 @@ def search(tmp_path_factory):
         heat = lambda time, start=start, end=end: 40.0 if start <= time < end else 0.0  # noqa: E731
         run = record(folder / f"run{number}", number, built=as_built(7), times=TIMES, extra=heat)
         runs.append(read_recording(run))
-    machine = open_machine(folder / "drive.toml", (), runs, [])
-    predictor = Predictor(machine.fast, machine.recordings)
+    return open_machine(folder / "drive.toml", (), runs, [])
+
+
+def search_of(machine, use=None):
+    """A search that has not begun."""
+    predictor = Predictor(machine.fast, machine.recordings, use)
     calibrated = calibrate(None, predictor)
     problem = Problem(predictor, calibrated.known, calibrated.slow, predictor.observations)
     effects = catalogue()
@@ -47,9 +52,14 @@ def search(tmp_path_factory):
     return Search(problem, machine.view, effects, (), interval_effects(), weights, found={})
 
 
-def heat_in(search, number):
+@pytest.fixture(scope="module")
+def search(machine):
+    return search_of(machine)
+
+
+def heat_in(search, number, intervals=None):
     effect = search.effects["unrecorded_heat_source"]
-    return search.of_recording(effect.over(search.view, "body", [ON[number]]), number, 40.0)
+    return search.of_recording(effect.over(search.view, "body", intervals or [ON[number]]), number, 40.0)
 
 
 def test_two_of_a_kind_in_two_recordings_have_values_of_their_own(search):
@@ -100,6 +110,20 @@ def test_sets_of_two_recordings_are_not_alike_and_need_no_odds_of_one_place():
     assert are_alike(alone, law, {})
     beside = hypothesis(first, candidate("radiation"), misfit=400.0).fit
     assert odds_needed(both, alone, {}) < odds_needed(beside, alone, {})
+
+
+def test_pulses_of_two_recordings_may_be_one_each_by_all_readings(machine):
+    """Each is followed in turn, although one pulse is no longer what switches."""
+    held = (TIMES > 1500.0) & (TIMES < 5100.0)
+    search = search_of(machine, [~held, ~held])
+    halves = [[(start, start + 480.0), (end - 480.0, end)] for start, end in ON]
+    both = [heat_in(search, number, pulses) for number, pulses in enumerate(halves)]
+    fit = search.problem.fit(both, {c.amplitude: 40.0 for c in both}, iterations=0)
+    states = inferred_states(search, search.problem, fit)
+    effect = search.effects["unrecorded_heat_source"]
+    for own, on in zip(both, ON, strict=True):
+        (found,) = effect.intervals(states[own.amplitude].candidate, {})
+        assert found == pytest.approx(on, abs=120.0)
 
 
 @pytest.mark.slow

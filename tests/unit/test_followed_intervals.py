@@ -8,13 +8,13 @@ import pytest
 from spindle_fem.effects.framework.unrecorded import STEPS
 from spindle_fem.effects.registry import catalogue, interval_effects
 from spindle_fem.inference.followed_readings import FollowedReadings
+from spindle_fem.inference.followed_states import inferred_states
 from spindle_fem.inference.hypothesis_fit import Problem, amplitude_name
 from spindle_fem.inference.hypothesis_search import Search
 from spindle_fem.inference.opened_machine import open_machine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import calibrate
 from spindle_fem.inference.set_problems import SetProblems
-from spindle_fem.inference.state_search import inferred_states
 from spindle_fem.inference.unseen_moments import unseen_moments
 from spindle_fem.recordings.align import read_recording
 from tests.support.flawed_network import MACHINE, record

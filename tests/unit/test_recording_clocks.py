@@ -7,6 +7,7 @@ import pytest
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.findings import at_stamps
+from spindle_fem.inference.followed_states import _held_out
 from spindle_fem.inference.hidden_states import readings_about
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.misdescription import EVERY_CHANNEL
@@ -16,7 +17,6 @@ from spindle_fem.inference.missing_heat import stretches
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
 from spindle_fem.inference.recording_clocks import LEAST_LATE, on_clock_of_inputs, restamped
-from spindle_fem.inference.state_search import _held_out
 from spindle_fem.inference.unseen_moments import unread_changes
 from tests.support.diagnosed_spindle import TIMES, written
 

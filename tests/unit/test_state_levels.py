@@ -7,8 +7,9 @@ import pytest
 
 from spindle_fem.effects.registry import build, catalogue, definition_entry
 from spindle_fem.inference import state_search
+from spindle_fem.inference.followed_states import inferred_states
 from spindle_fem.inference.hypothesis_fit import amplitude_name
-from spindle_fem.inference.state_search import inferred_states, settle, settle_best
+from spindle_fem.inference.state_search import settle, settle_best
 from tests.support.flawed_network import DURATION
 from tests.support.searched_network import searched
 

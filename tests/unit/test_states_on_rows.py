@@ -9,8 +9,9 @@ from spindle_fem.effects.framework.unrecorded import STATES, InIntervals
 from spindle_fem.effects.registry import catalogue
 from spindle_fem.inference import opened_machine
 from spindle_fem.inference.followed_readings import FollowedReadings
+from spindle_fem.inference.followed_states import inferred_states, states_on_rows
+from spindle_fem.inference.hypothesis_search import BLUR
 from spindle_fem.inference.set_problems import SetProblems
-from spindle_fem.inference.state_search import BLUR, inferred_states, states_on_rows
 from tests.support.flawed_network import DURATION
 from tests.support.searched_network import searched
 from validation.score_families import overlap_score
