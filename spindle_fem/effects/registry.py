@@ -27,6 +27,8 @@ from spindle_fem.units import to_si
 Owner = TypeVar("Owner", Term, Reading)
 # Reynolds numbers of a channel without flow: any range does, as film laws leave such a channel alone.
 STANDING_REYNOLDS = (100.0, 1000.0)
+# Parameters that are moments from the start of a recording, and a moment of a period.
+INSTANTS, PHASE = ("start", "time", "middle"), "phase"
 
 
 GROUP = "effects"
@@ -97,9 +99,16 @@ def effects_in_definition(spec: MachineSpec) -> frozenset[str]:
     return frozenset(name for name, effect in _found().items() if effect.in_definition(spec))
 
 
-def candidates_for(view: MachineView) -> tuple[Candidate, ...]:
-    """All effects but those of intervals, in all forms at all places of a machine."""
-    return tuple(candidate for effect in _found().values() for candidate in effect.candidates(view))
+def candidates_for(view: MachineView, recordings: int = 1) -> tuple[Candidate, ...]:
+    """All effects but those of intervals, in all forms at all places of a machine.
+
+    Of several recordings, whose times have nothing to do with each other, laws that know a moment stand in
+    each of them by itself too.
+    """
+    found = tuple(candidate for effect in _found().values() for candidate in effect.candidates(view))
+    timed = [c for c in found if any(item.name in (*INSTANTS, PHASE) for item in c.parameters.values())]
+    each = range(recordings if recordings > 1 else 0)
+    return (*found, *(in_recording(candidate, number) for number in each for candidate in timed))
 
 
 def interval_effects() -> tuple[IntervalEffect, ...]:
@@ -211,19 +220,19 @@ def fixed(candidate: Candidate, values: Mapping[str, float]) -> Candidate:
 
 
 def in_recording(candidate: Candidate, number: int) -> Candidate:
-    """A candidate that consists of terms, in one recording only, with parameters of its own there.
+    """A candidate of terms or a reading in one recording only, with parameters of its own there.
 
     What is on in intervals of one recording may be on in others of another.
     """
-    own = tuple(_with(term, name=f"{term.name}.in_{number}") for term in candidate.terms)
-    names = dict(zip(candidate.parameters, (name for term in own for name in term.names()), strict=True))
-    return replace(
-        candidate,
-        terms=own,
-        amplitude=names[candidate.amplitude],
-        starts=tuple({names[name]: value for name, value in start.items()} for start in candidate.starts),
-        recording=number,
-    )
+
+    def renamed(owner: Owner) -> Owner:
+        return _with(owner, name=f"{owner.name}.in_{number}")
+
+    reading = None if candidate.reading is None else renamed(candidate.reading)
+    own = replace(candidate, terms=tuple(map(renamed, candidate.terms)), reading=reading, recording=number)
+    names = dict(zip(candidate.parameters, own.parameters, strict=True))
+    starts = tuple({names[name]: value for name, value in start.items()} for start in candidate.starts)
+    return replace(own, amplitude=names[candidate.amplitude], starts=starts)
 
 
 def _with(owner: Owner, **changed: Any) -> Owner:

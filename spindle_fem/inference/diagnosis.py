@@ -165,7 +165,7 @@ def diagnose_recordings(
     if calibration:
         earlier = Predictor(fast, calibration, effects=machine.effects).with_unseen(unseen)
     directions = misdescriptions_of(predictor)
-    candidates = candidates_for(view)
+    candidates = candidates_for(view, len(recordings))
     places = sorted(acted_on(predictor, view, candidates))
     calibrating = workers.ahead(partial(_calibrated, earlier, predictor, directions, places))
     small, predictor, known = smaller_predictors(predictor, view, candidates)

@@ -95,7 +95,7 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
     parameters = reported_parameters(fit, candidate)
     reported = {name: Reported(item["value"], item["unit"]) for name, item in parameters.items()}
     values = candidate_values(candidate, fit.values)
-    intervals = []
+    intervals, named = [], _named(diagnosis, candidate)
     if in_intervals(effect, candidate):
         pairs = effect.intervals(candidate, values)
         intervals = [
@@ -104,12 +104,12 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
                 "end": diagnosis.stamp(end, candidate.recording or 0),
                 "value": size,
             }
-            | _named(diagnosis, candidate)
+            | named
             for (start, end), size in zip(pairs, effect.sizes(candidate, values), strict=True)
         ]
     law = candidate.effect, followed_name(candidate)
     elsewhere = [c for c in fit.candidates if c is not candidate and (c.effect, followed_name(c)) == law]
-    words = "".join(f" That is in {name} only." for name in _named(diagnosis, candidate).values())
+    words = "".join(f" That is in {name} only." for name in named.values())
     words += "".join(f" It enters at {place_words(c.component)} as well." for c in elsewhere if law[1])
     if state is None and intervals:
         words += sizes_words([item["value"] for item in intervals], size_unit(parameters))
@@ -129,7 +129,7 @@ def finding(diagnosis: Diagnosis, fit: Fit, candidate: Candidate, probability: f
         "follows": followed_name(candidate) or None,
         "statement": effect.statement(candidate, reported) + words,
         "check": effect.check_of(candidate),
-    }
+    } | named
 
 
 def size_unit(parameters: Mapping[str, Mapping[str, Any]]) -> str:

@@ -151,13 +151,19 @@ class Search:
             Screened as well.
         """
         families = self.families()
-        present = {(effect, families.get(component, component)) for effect, component, _ in fit.keys}
-        allowed = [
-            c for c in self.candidates if (c.effect, families.get(c.component, c.component)) not in present
-        ]
-        times, residual = self._residual(fit)
+
+        def is_present(candidate: Candidate) -> bool:
+            whole = families.get(candidate.component, candidate.component)
+            alike = (c for c in fit.candidates if c.effect == candidate.effect and c.meets(candidate))
+            return any(families.get(c.component, c.component) == whole for c in alike)
+
+        left = [self._residual(fit, number) for number in range(len(self.problem.predictor.recordings))]
         variants = variants_of(
-            [replace(c, starts=self.effects[c.effect].starts_from(c, times, residual)) for c in allowed]
+            [
+                replace(c, starts=self.effects[c.effect].starts_from(c, *left[c.recording or 0]))
+                for c in self.candidates
+                if not is_present(c)
+            ]
         )
         intervals, linear = {}, None
         recordings = () if only_laws else self.without_intervals(fit)
@@ -175,15 +181,15 @@ class Search:
             self.screenings[identity(fit.candidates)] = found
         return found, intervals
 
-    def _residual(self, fit: Fit) -> tuple[Array, Array]:
-        """Residuals of a fit for the first recording's usable readings, NaN elsewhere."""
+    def _residual(self, fit: Fit, number: int) -> tuple[Array, Array]:
+        """Stamps of a recording and residuals of a fit for its usable readings, NaN elsewhere."""
         predictor = self.problem.predictor
-        recording = predictor.recordings[0]
-        predicted = predictor.predict(0, fit.values, fit.candidates).temperature
-        grid = predictor.drives[0].grid
-        times = predictor.stamps(0)
+        recording = predictor.recordings[number]
+        predicted = predictor.predict(number, fit.values, fit.candidates).temperature
+        grid = predictor.drives[number].grid
+        times = predictor.stamps(number)
         at_stamps = np.column_stack([np.interp(times, grid, column) for column in predicted.T])
-        known = recording.usable & predictor.use[0][:, None]
+        known = recording.usable & predictor.use[number][:, None]
         return times, np.where(known, recording.temperature - at_stamps, np.nan)
 
     def without_intervals(self, fit: Fit) -> tuple[int, ...]:

@@ -19,7 +19,7 @@ from scipy.linalg import block_diag
 
 from spindle_fem.effects.framework.effect import Candidate
 from spindle_fem.effects.framework.machine_view import MachineView
-from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
+from spindle_fem.effects.registry import INSTANTS, candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun, Variant, variants_of
 from spindle_fem.inference.coordinate_names import NO_VALUES
@@ -54,8 +54,6 @@ Progress = Callable[[str], None]
 
 # Intervals of unrecorded heat or cooling that represent all others, as shares of the test.
 INTERVALS = ((0.0, 1.0), (0.05, 0.35), (0.2, 0.5), (0.35, 0.65), (0.5, 0.8), (0.65, 0.95), (0.4, 0.95))
-# Parameters of laws that are instants.
-INSTANTS = ("start", "time", "middle")
 # Prior of nothing missing over that of one effect.
 NOTHING = tuned.NUMBER_PRIOR[0] / tuned.NUMBER_PRIOR[1]
 # Sizes beyond this multiple of the usual one are not reported: first-order responses do not cover them.
@@ -278,7 +276,7 @@ def _begun_within(law: Variant, share: float) -> Variant:
     moved = {
         name: share * law.shape.get(name, item.value)
         for name, item in law.candidate.parameters.items()
-        if item.name in INSTANTS and item.unit == "s"
+        if item.name in INSTANTS
     }
     return replace(law, shape={**law.shape, **moved}) if moved else law
 

@@ -137,14 +137,15 @@ def _of_neighbours(search: Search, fit: Fit, member: Candidate, rest: tuple[Cand
     """Fits of a network, which are quick, with what may act near one member of a set in its place.
 
     Screened about what the others alone leave, as a search has done before. Unrecorded heat in intervals fits
-    almost anything: it is tried at other spots, and beside others any law is tried in its place. Where it
-    follows a recorded quantity it is tried at other spots too; and the other forms of one law, which hardly
-    differ to first order.
+    almost anything: it is tried at other spots, and beside others any law is tried in its place; itself in
+    that of a law of one of several recordings. Where it follows a recorded quantity it is tried at other
+    spots too; and the other forms of one law, which hardly differ to first order.
     """
     own = {effect.name for effect in search.interval_effects}
     tasks: list[Task] = []
-    if search.in_intervals(member):
+    if search.in_intervals(member) or member.recording is not None:
         tasks += at_other_spots(search, fit, member, rest)
+    if search.in_intervals(member):
         tasks += _with_laws(search, rest, lambda c: bool(rest) or c.effect in own)
     else:
         if member.effect in own:
@@ -152,7 +153,7 @@ def _of_neighbours(search: Search, fit: Fit, member: Candidate, rest: tuple[Cand
         tasks += _with_laws(
             search,
             rest,
-            lambda c: (c.effect, c.component) == (member.effect, member.component) and c.form != member.form,
+            lambda c: c.key[:2] == member.key[:2] and (c.key, c.form) != (member.key, member.form),
         )
         places = _beside(search, member.component)
         tasks += _with_laws(search, rest, lambda c: c.component in places and c.effect != member.effect)

@@ -129,11 +129,10 @@ def set_words(findings: Sequence[Mapping[str, Any]]) -> str:
 def in_recording(finding: Mapping[str, Any]) -> str:
     """The one of several recordings that a finding is of, behind a place; empty if it is of all.
 
-    >>> in_recording({"intervals": [{"start": 0.0, "end": 60.0, "recording": "monday"}]})
+    >>> in_recording({"effect": "windage", "component": "shaft", "recording": "monday"})
     ' in monday'
     """
-    named = (item["recording"] for item in finding.get("intervals", ()) if "recording" in item)
-    return next((f" in {name}" for name in named), "")
+    return f" in {finding['recording']}" if "recording" in finding else ""
 
 
 def misdescription_words(row: Mapping[str, Any]) -> str:

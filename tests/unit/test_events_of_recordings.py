@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spindle_fem.effects.registry import catalogue, effect_of, interval_effects
+from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.inference.candidate_response import Variant
 from spindle_fem.inference.diagnosis import diagnose_recordings, overlapping_components
 from spindle_fem.inference.findings import predictions_at_stamps
@@ -98,6 +98,27 @@ def test_one_kind_at_one_place_makes_a_pair_in_two_recordings_only(search):
     variants = [Variant(c, {}) for c in (first, second, heat_in(search, 0), everywhere)]
     screened = screen(search.problem, search.problem.fit(), variants, search.weights, {})
     assert {tuple(members) for members in screened._sets(2)} == {(0, 1), (1, 2)}
+
+
+def test_laws_that_know_a_moment_stand_in_each_of_several_recordings(search):
+    whole, each = candidates_for(search.view), candidates_for(search.view, 2)
+    assert [c.amplitude for c in each[: len(whole)]] == [c.amplitude for c in whole]
+    of_one = {(c.effect, c.form) for c in each[len(whole) :]}
+    assert {("sensor_detached", ""), ("sensor_drift", "from a time on"), ("ambient_drift", "hump")} <= of_one
+    assert not {"sensor_offset", "windage", "radiation"} & {effect for effect, _ in of_one}
+    assert len({c.amplitude for c in each}) == len(each)
+    off = [c for c in each if c.key[:2] == ("sensor_detached", "body") and c.form == ""]
+    assert [c.recording for c in off] == [None, 0, 1]
+    # It begins from abrupt departures in its own recording.
+    screened, _ = replace(search, candidates=tuple(off[1:])).screened(
+        search.problem.fit(iterations=0), only_laws=True
+    )
+    begun = [set(), set()]
+    for variant in screened.variants:
+        own = variant.candidate
+        begun[own.recording].add(variant.shape[f"{own.reading.name}.time"])
+    assert begun[0] - begun[1]
+    assert len(begun[0] & begun[1]) >= 8
 
 
 def test_sets_of_two_recordings_are_not_alike_and_need_no_odds_of_one_place():
