@@ -466,7 +466,8 @@ class Search:
         found = float(np.log(tuned.NUMBER_PRIOR[len(candidates)]))
         for candidate in candidates:
             if self.in_intervals(candidate):
-                places = len(self.effects[candidate.effect].level_places(self.view))
+                recordings = len(self.problem.predictor.recordings)
+                places = recordings * len(self.effects[candidate.effect].level_places(self.view))
                 share = candidate.likelihood
             else:
                 same = [c for c in self.candidates if c.effect == candidate.effect]

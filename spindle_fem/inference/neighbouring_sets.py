@@ -102,7 +102,7 @@ def _in_place_of(
     warmed = {_bearings_warmed(search, member)}
     far_off: set[tuple[str, str]] = set()
     tasks: list[Task] = []
-    for index in screened.best_of(lambda c: c is not member, len(gains)):
+    for index in screened.best_of(lambda c: True, len(gains)):
         variant = screened.variants[index]
         candidate = variant.candidate
         bearings = _bearings_warmed(search, candidate)
@@ -114,7 +114,9 @@ def _in_place_of(
         chosen = good and len(tasks) < tuned.EFFECTS_EXCHANGED
         if chosen or variant.key in far_off or _of_one_sensor(candidate, member):
             amplitude = screened.amplitudes([index])[index]
-            tasks.append(search.task(left, [(variant, amplitude)], intervals))
+            # The member itself is among them: it has been fitted.
+            if identity((candidate,)) != identity((member,)):
+                tasks.append(search.task(left, [(variant, amplitude)], intervals))
             if chosen and is_far_off(variant, amplitude):
                 far_off.add(variant.key)
     return tasks

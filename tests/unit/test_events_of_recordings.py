@@ -72,6 +72,9 @@ def test_two_of_a_kind_in_two_recordings_have_values_of_their_own(search):
         together = predictor.predict(number, both, (first, second)).temperature
         alone = predictor.predict(number, {own.amplitude: size}, (own,)).temperature
         np.testing.assert_array_equal(together, alone)
+    # Neither recording is likelier than the other.
+    alone = replace(search, problem=SimpleNamespace(predictor=SimpleNamespace(recordings=[None])))
+    assert search.log_prior((first,)) == pytest.approx(alone.log_prior((first,)) - np.log(2.0))
     fit = search.problem.fit((first, second), both)
     assert len(fit.keys) == 2
     assert [fit.values[c.amplitude] for c in (first, second)] == pytest.approx([40.0, 40.0], rel=0.1)

@@ -104,6 +104,9 @@ def test_what_reads_like_a_member_is_tried_in_its_place(case):
     for candidates, score in (((), -1e4), ((case.candidates[sun],), 0.0)):
         search.keep(Hypothesis(search.problem.fit(candidates), score))
     best = search.ranked()[0]
+    tasks = neighbouring_sets._in_place_of(search, best.fit, case.candidates[sun], (), tuned.EXCHANGED_REACH)
+    assert len(tasks) == tuned.EFFECTS_EXCHANGED
+    assert identity(best.fit.candidates) not in {identity(members) for members, _ in tasks}
     exchanged(search)
     tried = {h.keys: h.fit.misfit_with_prior for h in search.found.values()}
     assert tried[frozenset({(*air, None)})] < best.fit.misfit_with_prior + tuned.NEAR_MISFIT
