@@ -77,7 +77,8 @@ class Search:
     progress: Progress = lambda stage: None
     workers: Workers = field(default_factory=Workers)
     found: dict[frozenset, Hypothesis] | None = None
-    screenings: dict[frozenset, Screened] = field(default_factory=dict)
+    # The last fit of each set that was screened, and its screening.
+    screenings: dict[frozenset, tuple[Fit, Screened]] = field(default_factory=dict)
     # Place and course of what switches, and what share of its gain that costs, by the name of its amplitude.
     courses: dict[str, tuple[Any, Any, float]] = field(default_factory=dict)
     _paid: dict[frozenset, float] = field(default_factory=dict)
@@ -178,7 +179,7 @@ class Search:
             self.problem, fit, variants, self.weights, families, trust, self.workers, linear=linear
         )
         if trust is None:
-            self.screenings[identity(fit.candidates)] = found
+            self.screenings[identity(fit.candidates)] = fit, found
         return found, intervals
 
     def _residual(self, fit: Fit, number: int) -> tuple[Array, Array]:

@@ -186,9 +186,9 @@ def _with_laws(
     base = search.found.get(identity(rest))
     if base is None:
         return []
-    if identity(rest) not in search.screenings:
-        search.screened(base.fit, only_laws=True)
-    screened = search.screenings[identity(rest)]
+    fit, screened = search.screenings.get(identity(rest), (None, None))
+    if fit is not base.fit:
+        screened, _ = search.screened(base.fit, only_laws=True)
     found = screened.best_of(lambda c: allowed(c) and not search.in_intervals(c), tuned.EFFECTS_EXCHANGED)
     gains, least = screened.singles(), -np.inf
     if search.is_explained(base):

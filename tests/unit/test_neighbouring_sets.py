@@ -62,7 +62,7 @@ class NotingSearch:
             np.zeros(count),
             np.zeros(count),
         )
-        self.screenings = {identity(()): screened}
+        self.screenings = {identity(()): (nothing.fit, screened)}
         self.asked: set = set()
 
     def ranked(self):
@@ -111,6 +111,17 @@ def test_other_forms_and_laws_at_its_place_are_tried_in_the_place_of_a_law_of_a_
     search = NotingSearch()
     exchanged(search)
     assert search.asked == {identity((RAMP,)), identity((BESIDE,))}
+
+
+def test_a_set_that_was_fitted_again_is_screened_again():
+    search, screened_about = NotingSearch(), []
+    ((_, known),) = search.screenings.values()
+    again = SimpleNamespace(candidates=(), values={"heat": 2.0})
+    search.found[identity(())] = SimpleNamespace(fit=again)
+    search.screened = lambda fit, **how: screened_about.append(fit) or (known, {})
+    exchanged(search)
+    assert screened_about
+    assert all(fit is again for fit in screened_about)
 
 
 def test_laws_at_its_place_are_tried_in_the_place_of_a_sensor_of_a_network_that_lies():
