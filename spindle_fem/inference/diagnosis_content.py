@@ -105,9 +105,10 @@ def diagnosis_content(
 def _by_what_is_told(diagnosis: Diagnosis) -> dict[str, float]:
     """Held-out errors with states and moments from all readings, sizes and laws without held-out ones.
 
-    And, where states are followed, without any of them.
+    And, where states are followed, without any of them. Nothing found is the same fit as before.
     """
-    if diagnosis.followed is None or diagnosis.followed.fit is diagnosis.final:
+    found = diagnosis.final.candidates and diagnosis.followed is not None
+    if not found or diagnosis.followed.fit is diagnosis.final:
         return {}
 
     def heldout_error(fit: Fit) -> float:

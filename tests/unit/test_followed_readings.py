@@ -7,6 +7,7 @@ import pytest
 
 from spindle_fem.effects.registry import effect_of
 from spindle_fem.inference import tuned
+from spindle_fem.inference.diagnosis_content import _by_what_is_told
 from spindle_fem.inference.followed_readings import FollowedReadings
 from spindle_fem.inference.hypothesis_fit import Problem
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW
@@ -78,3 +79,10 @@ def test_intervals_with_edges_of_their_own_are_followed_where_that_leaves_less(m
     monkeypatch.setattr(FollowedReadings, "left_with", lambda self, states: left if "heat" in states else 1.0)
     assert ("heat" in readings.followed(fit)) is kept
     assert "loss" in readings.followed(fit)
+
+
+def test_nothing_found_has_no_error_of_its_own_by_what_all_readings_tell():
+    """What inputs did between held-out rows is told with nothing missing too: after is as before then."""
+    nothing = SimpleNamespace(candidates=())
+    diagnosis = SimpleNamespace(final=nothing, followed=SimpleNamespace(fit=SimpleNamespace()))
+    assert _by_what_is_told(diagnosis) == {}
