@@ -46,6 +46,11 @@ def _stacked(height_px: float, title: str, ratios: tuple[float, ...]) -> tuple[F
     return figure, axes
 
 
+def _legend_above(axes, columns: int) -> None:
+    """Legend between the chart and what is over it, where no curve runs."""
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, ncols=columns)
+
+
 def _speed_strip(axes, result: StudyResult) -> None:
     edges = [result.phases[0].start, *(phase.end for phase in result.phases)]
     axes.stairs(
@@ -76,7 +81,7 @@ def probe_history(result: StudyResult, steady: Mapping[str, float] | None = None
         upper.plot([], [], color=MUTED, linestyle=":", label="steady state of the last phase")
     _phase_ends(upper, result)
     upper.set_ylabel(TEMPERATURE_LABEL)
-    upper.legend(ncols=3)
+    _legend_above(upper, 3)
     _speed_strip(lower, result)
     return figure
 
@@ -105,7 +110,7 @@ def bearing_history(result: StudyResult) -> Figure | None:
     for axes in (upper, lower):
         _phase_ends(axes, result)
     upper.set_ylabel(TEMPERATURE_LABEL)
-    upper.legend(ncols=4)
+    _legend_above(upper, 4)
     lower.set_ylabel("inner − outer / K")
     return figure
 
@@ -127,12 +132,12 @@ def heat_history(result: StudyResult) -> Figure:
     for axis in axes:
         _phase_ends(axis, result)
     axes[0].set_ylabel("heat / W")
-    axes[0].legend()
+    _legend_above(axes[0], 2)
     if follows:
         for column, name in enumerate(result.phases[0].transient.bearings):
             axes[1].plot(hours, preload[:, column], color=CYCLE[column % len(CYCLE)], label=name)
         axes[1].set_ylabel("preload / N")
-        axes[1].legend(ncols=5)
+        _legend_above(axes[1], 5)
     return figure
 
 
@@ -150,7 +155,7 @@ def growth_history(result: StudyResult) -> Figure | None:
         upper.plot(hours, motion[:, column], color=CYCLE[number % len(CYCLE)], label=label)
     _phase_ends(upper, result)
     upper.set_ylabel("since assembly / µm")
-    upper.legend(ncols=3)
+    _legend_above(upper, 3)
     _speed_strip(lower, result)
     return figure
 

@@ -4,8 +4,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from spindle_fem.report.transient_charts import heat_history, probe_history
+from spindle_fem.report.transient_charts import (
+    bearing_history,
+    growth_history,
+    heat_history,
+    probe_history,
+)
 from spindle_fem.studies.transient_study import StudyResult
 
 HOUR = 3600.0
@@ -22,8 +28,10 @@ def phase(start, end, preload):
     )
     readings = 290.0 + np.column_stack([times, 2.0 * times]) / HOUR
     transient = SimpleNamespace(
-        times=times, readings=readings, probes=("A", "B"), bearings=("F1", "R1"), steps=steps
-    )
+        times=times, readings=readings, probes=("A", "B"), bearings=("F1", "R1"), steps=steps,
+        inner=readings + 5.0, outer=readings, motions=("nose_axial", "nose_radial_up"),
+        motion=1e-6 * readings,
+    )  # fmt: skip
     return SimpleNamespace(start=start, end=end, point=SimpleNamespace(speed=100.0), transient=transient)
 
 
@@ -51,3 +59,16 @@ def test_where_the_last_phase_tends_to_is_drawn_over_it():
 )
 def test_preload_is_drawn_where_it_changes(preload, charts):
     assert len(heat_history(result(preload)).axes) == charts
+
+
+@pytest.mark.parametrize("chart", [probe_history, bearing_history, heat_history, growth_history])
+def test_legends_lie_over_no_curve_and_not_over_the_title(chart):
+    figure = chart(result(np.array([[500.0, 400.0], [505.0, 400.0], [510.0, 400.0]])))
+    FigureCanvasAgg(figure).draw()
+    legends = [axes.get_legend() for axes in figure.axes if axes.get_legend() is not None]
+    assert legends
+    taken = [axes.get_window_extent() for axes in figure.axes] + [figure._suptitle.get_window_extent()]
+    for legend in legends:
+        box = legend.get_window_extent()
+        assert not any(box.overlaps(other) for other in taken)
+        assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width
