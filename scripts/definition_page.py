@@ -89,6 +89,7 @@ A changed value takes the mark that this file gives it, else U.
 `--set path=value` on the command line changes one value: `channel.depth=19mm`,
 `bearing_set.front.preload=900N`, `part.shaft.segment.nose.outer_diameter=178mm`,
 `heat.table.heat.F1[7]=160W` (positions count from 1), `channel.ports=none`. Such values carry the mark U.
+What rules add to the file is set by its name too: `joint.workshop_inner_seats.conductance=5000W/m**2/K`.
 
 ## What ships
 

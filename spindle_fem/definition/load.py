@@ -31,6 +31,7 @@ from spindle_fem.definition.inherit import (
 )
 from spindle_fem.definition.machine_spec import MACHINE_SCHEMA, MachineSpec
 from spindle_fem.definition.mended_tables import mended
+from spindle_fem.definition.overridden import overridden
 from spindle_fem.definition.schema import annotation_of, names_of
 from spindle_fem.errors import BadInputError, FaultsError, SpecError, SpindleFemError, did_you_mean
 
@@ -369,7 +370,7 @@ def _layers_and_content(machine: str | Path, overrides: Iterable[str]) -> tuple[
     faults: list[SpindleFemError] = []
     for override in overrides:
         try:
-            content = with_named_types(apply_overrides(content, [override]))
+            content = overridden(content, override)
             path, _ = split_override(override)
             layers.append(Layer(f"--set {path}", {}, path))
         except SpecError as error:

@@ -7,15 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from spindle_fem.definition.completion import with_named_types
-from spindle_fem.definition.load import (
-    apply_overrides,
-    find_machine,
-    load_machine,
-    read_definition,
-)
+from spindle_fem.definition.load import find_machine, load_machine, read_definition
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.errors import FaultsError, SpecError, SpindleFemError
+from spindle_fem.definition.overridden import overridden, with_ruled_value
+from spindle_fem.errors import FaultsError, SpecError, SpindleFemError, UnknownKeyError
 from spindle_fem.studies.sweep.designs import Axis, build_axes, plan_designs, reference_designs
 from spindle_fem.studies.sweep.evaluate_design import DesignTask, Question, TaskBuilder
 from spindle_fem.studies.sweep.judge_designs import Limit, limits_of
@@ -76,14 +71,18 @@ def prepare_study(machine: str | Path, study: str | Path, overrides: Iterable[st
     """
     overrides = tuple(overrides)
     spec = load_machine(machine, overrides)
-    content = apply_overrides(with_named_types(read_definition(find_machine(machine))), overrides)
+    content = overridden(read_definition(find_machine(machine)), *overrides)
     read = load_study(study)
     where = Path(study).name
     faults: list[SpindleFemError] = []
     axes: tuple[Axis, ...] = ()
     limits: tuple[Limit, ...] = ()
     try:
+        for parameter in read.parameter:
+            content = with_ruled_value(content, parameter.path)
         axes = build_axes(read, content, where)
+    except UnknownKeyError as error:
+        faults.append(error)
     except FaultsError as error:
         faults += error.faults
     faults += _output_faults(read, spec, where)
