@@ -11,9 +11,10 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.defined_effects import ActiveEffects
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.film_heat import FilmHeat
+from spindle_fem.model.reduced.film_heat import film_heat_of
 from spindle_fem.model.reduced.followed_preload import FollowedPreload, MountedRun, sample_preload
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
+from spindle_fem.operation.friction_map import film_temperature
 from spindle_fem.recordings.align import Recording
 
 Array = NDArray[np.float64]
@@ -44,7 +45,7 @@ def with_followed_preload(
     ConvergenceError
         The bearings have no equilibrium where a run goes.
     """
-    (plain,) = (term for term in fast.inputs.extra_terms if isinstance(term, FilmHeat))
+    plain = film_heat_of(fast)
 
     def followed(preload: FollowedPreload | None) -> FastModel:
         if preload is None:
@@ -64,12 +65,37 @@ def preload_along(predictor: Predictor, number: int, factors: Mapping[str, float
 
     At the starts of all steps, then at their ends.
     """
-    terms = (term for term in predictor.fast.inputs.extra_terms if isinstance(term, FilmHeat))
-    preload = next((term.preload for term in terms if term.preload is not None), None)
+    term = film_heat_of(predictor.fast)
+    preload = None if term is None else term.preload
     if preload is None:
         return {}
     found = preload.preload(predictor.fast.model, _run(predictor, number, factors))
     return dict(zip(predictor.fast.bearings, found.T, strict=True))
+
+
+def require_solved_friction(
+    fast: FastModel,
+    recordings: Sequence[Recording],
+    effects: ActiveEffects,
+    factors: Mapping[str, float] | None = None,
+) -> None:
+    """Refuse recordings along which bearings of assembly size come to a state without equilibrium.
+
+    Raises
+    ------
+    NoEquilibriumError, OutOfValidityError
+        As the friction map has it.
+    """
+    term = film_heat_of(fast)
+    # Bearings that follow expansion are solved in the states that they have.
+    if term is None or term.preload is not None or not term.friction_map.refused:
+        return
+    predictor = Predictor(fast, recordings, effects=effects, at_stamps=True)
+    sides = np.array([term.read_row(fast.model, name) for name in term.reads])
+    for number in range(len(recordings)):
+        run = _run(predictor, number, factors or {})
+        temperatures = (sides @ run.unknowns.T).reshape(-1, 3, len(run.times)).swapaxes(0, 1)
+        term.friction_map.require_solved(run.speed, run.thrust, film_temperature(*temperatures))
 
 
 def _run(predictor: Predictor, number: int, factors: Mapping[str, float]) -> MountedRun:

@@ -16,7 +16,7 @@ from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.registry import effects_in_definition
 from spindle_fem.errors import ConvergenceError, RecordingError
-from spindle_fem.inference.followed_model import with_followed_preload
+from spindle_fem.inference.followed_model import require_solved_friction, with_followed_preload
 from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.input_sampling import unseen_power
 from spindle_fem.inference.recording_gaps import with_changes_amid
@@ -129,6 +129,7 @@ def open_machine(
                 "preload follows the temperatures, by bearing mechanics at states of the machine as defined "
                 f"along these recordings; between them friction errs by {100.0 * error:.2g} % at most"
             )
+    require_solved_friction(fast, every, effects)
     return DiagnosedMachine(
         spec.name,
         spec,

@@ -8,7 +8,8 @@ speed and thrust; :class:`FrictionMap` joins series over speeds and thrusts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.errors import NoEquilibriumError, OutOfValidityError, SpecError
+from spindle_fem.errors import NoEquilibriumError, OutOfValidityError, SpecError, SpindleFemError
 from spindle_fem.operation.bearing_heat import BearingMechanics, FilmCurves
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.units import ZERO_CELSIUS_K
@@ -34,6 +35,8 @@ NOMINAL_FILM_TEMPERATURE = ZERO_CELSIUS_K + 30.0
 NARROW_THRUSTS = 0.1
 # Quantities of a map's series: natural logarithms of the moment in N·m and of both conductances in W/K.
 MOMENT, CONDUCTANCES = slice(0, 1), slice(1, 3)
+# Position of a state of a map: speed, thrust, temperature of the film.
+State = tuple[int, int, int]
 
 
 def film_temperature(inner: ArrayLike, outer: ArrayLike, balls: ArrayLike) -> NDArray:
@@ -129,6 +132,9 @@ class FrictionMap:
     shares : CubicSpline or None
         Over the thrust, (n_thrusts,): how much each of them counts; None where
         there is but one.
+    refused : mapping of State to SpindleFemError
+        States in which the bearings have no equilibrium at the size of assembly. What the map has there goes
+        on smoothly from the others: something to count from, no answer. See :meth:`require_solved`.
     """
 
     bearings: tuple[str, ...]
@@ -137,6 +143,7 @@ class FrictionMap:
     turning: CubicSpline
     at_rest: Array
     shares: CubicSpline | None
+    refused: Mapping[State, SpindleFemError]
 
     def at(self, speed: float, thrust: float) -> FilmSeries:
         """Series over the film temperature at a speed (rad/s) and thrust (N).
@@ -171,6 +178,41 @@ class FrictionMap:
         """Between balls and inner and outer raceway with films at 30 °C, (n_bearings, 2) [W/K]."""
         film = np.full((len(self.bearings), 1), NOMINAL_FILM_TEMPERATURE)
         return np.exp(self.at(speed, thrust).at(film, CONDUCTANCES)[:, :, 0])
+
+    def require_solved(self, speed: Array, thrust: Array, films: Array) -> None:
+        """Refuse instants of a run that lie next to a state in which the bearings have no equilibrium.
+
+        Parameters
+        ----------
+        speed, thrust : (n,) ndarray, [rad/s], [N]
+        films : (n_bearings, n) ndarray, [K]
+
+        Raises
+        ------
+        NoEquilibriumError, OutOfValidityError
+            As the bearings gave it, with the state.
+        """
+        if not self.refused:
+            return
+        kelvin = chebyshev_nodes(*FILM_TEMPERATURES, TEMPERATURE_POINTS)
+        missing = np.zeros((len(self.speed), len(self.thrust), len(kelvin)), dtype=bool)
+        missing[tuple(np.array(list(self.refused)).T)] = True
+        sides = _beside(self.speed, speed), _beside(self.thrust, thrust), _beside(kelvin, films)
+        for state in itertools.product(*sides):
+            row, instant = np.nonzero(missing[state] & (speed > 0.0))
+            if len(row):
+                first = row[0], instant[0]
+                raise self.refused[tuple(int(np.broadcast_to(item, films.shape)[first]) for item in state)]
+
+    def require_complete(self) -> None:
+        """Refuse a map with states in which the bearings have no equilibrium.
+
+        Raises
+        ------
+        NoEquilibriumError, OutOfValidityError
+        """
+        for error in self.refused.values():
+            raise error
 
     def _require(self, speed: float, thrust: float) -> None:
         rpm = 30.0 / np.pi
@@ -225,11 +267,15 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
     thrusts : sequence of float, [N]
         That occur; a cubic spline between them (a parabola through three).
 
+    States without an equilibrium are left to :meth:`FrictionMap.require_solved`: a machine may never have
+    them, or not at the size of assembly.
+
     Raises
     ------
     SpecError
         Nothing to tabulate, or heat that was asked to follow expansion.
     NoEquilibriumError, OutOfValidityError
+        There is none at standstill, or in any state at one of the thrusts.
     """
     if not needs_map(spec):
         raise SpecError("heat.model", "the heat is given by table already.", "Use the machine as it is.")
@@ -246,32 +292,95 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
     speeds = highest_speed * np.array(SPEED_SHARES)
     loads = np.unique(np.asarray(thrusts, dtype=float))
     kelvin = chebyshev_nodes(*FILM_TEMPERATURES, TEMPERATURE_POINTS)
-
-    def series(speed: float, thrust: float) -> Array:
-        curves = _curves(mechanics, _point(spec, speed, thrust), kelvin)
-        values = np.array([_log_quantities(curves[name], speed) for name in names])
-        if speed > 0.0:
-            values[:, MOMENT] -= np.log(factors)[:, None, None]
-        return FilmSeries.through(kelvin, values, *FILM_TEMPERATURES).coefficients
-
-    turning = np.array([[series(speed, thrust) for thrust in loads] for speed in speeds])
-    at_rest = np.array([series(0.0, thrust) for thrust in loads])
+    refused: dict[State, SpindleFemError] = {}
+    values = np.empty((len(speeds), len(loads), len(names), 3, len(kelvin)))
+    for row, speed in enumerate(speeds.tolist()):
+        for column, thrust in enumerate(loads.tolist()):
+            values[row, column], errors = _states(mechanics, _point(spec, speed, thrust), kelvin)
+            refused |= {(row, column, film): error for film, error in errors.items()}
+    values[:, :, :, MOMENT] -= np.log(factors)[:, None, None]
+    for column in range(len(loads)):
+        if np.isnan(values[:, column]).all(axis=(1, 2, 3)).all():
+            raise refused[0, column, 0]
+    at_rest = []
+    for thrust in loads.tolist():
+        still, errors = _states(mechanics, _point(spec, 0.0, thrust), kelvin)
+        for error in errors.values():
+            raise error
+        at_rest.append(still)
+    turning = FilmSeries.through(kelvin, _continued(values, np.log(speeds)), *FILM_TEMPERATURES).coefficients
+    standing = FilmSeries.through(kelvin, np.array(at_rest), *FILM_TEMPERATURES).coefficients
     shares = CubicSpline(loads, np.eye(len(loads))) if len(loads) > 1 else None
-    return FrictionMap(names, speeds, loads, CubicSpline(np.log(speeds), turning), at_rest, shares)
+    return FrictionMap(names, speeds, loads, CubicSpline(np.log(speeds), turning), standing, shares, refused)
 
 
-def _curves(mechanics: BearingMechanics, point: OperatingPoint, kelvin: Array) -> dict[str, FilmCurves]:
-    """Heat and contacts over film temperatures; an error says at which state there are none."""
+def _states(
+    mechanics: BearingMechanics, point: OperatingPoint, kelvin: Array
+) -> tuple[Array, dict[int, SpindleFemError]]:
+    """Logarithms of moment and conductances over film temperatures, (n_bearings, 3, n_t), nan where refused.
+
+    The second answer is why, by the number of the temperature.
+    """
     try:
-        return mechanics.over_film_temperature(point, kelvin)
-    except (NoEquilibriumError, OutOfValidityError) as error:
-        low, high = (end - ZERO_CELSIUS_K for end in FILM_TEMPERATURES)
-        what = (
-            f"{error.what.removesuffix('.')}. The fast model needs the friction at "
-            f"{point.speed * 30.0 / np.pi:.0f} rpm, {point.thrust:.0f} N of thrust and films of {low:.0f} to "
-            f"{high:.0f} °C, at the size of assembly."
-        )
-        raise type(error)(error.where, what, error.how_to_fix) from error
+        curves = mechanics.over_film_temperature(point, kelvin)
+    except (NoEquilibriumError, OutOfValidityError):
+        # One state that is hard to reach stops all of them; alone each has its own way.
+        return _one_by_one(mechanics, point, kelvin)
+    return np.array([_log_quantities(item, point.speed) for item in curves.values()]), {}
+
+
+def _one_by_one(
+    mechanics: BearingMechanics, point: OperatingPoint, kelvin: Array
+) -> tuple[Array, dict[int, SpindleFemError]]:
+    """As :func:`_states`, every temperature by itself."""
+    values = np.full((len(mechanics.spec.bearings), 3, len(kelvin)), np.nan)
+    errors: dict[int, SpindleFemError] = {}
+    for number, temperature in enumerate(kelvin.tolist()):
+        try:
+            curves = mechanics.over_film_temperature(point, [temperature])
+        except (NoEquilibriumError, OutOfValidityError) as error:
+            what = (
+                f"{error.what.removesuffix('.')}. The fast model needs the friction near "
+                f"{point.speed * 30.0 / np.pi:.0f} rpm, {point.thrust:.0f} N of thrust and a film of "
+                f"{temperature - ZERO_CELSIUS_K:.0f} °C, at the size of assembly."
+            )
+            errors[number] = type(error)(error.where, what, error.how_to_fix)
+            continue
+        values[:, :, [number]] = [_log_quantities(item, point.speed) for item in curves.values()]
+    return values, errors
+
+
+def _continued(values: Array, log_speeds: Array) -> Array:
+    """Values (n_speeds, n_thrusts, n_bearings, 3, n_t), the missing ones (nan) put where curves bend least.
+
+    Over the film's temperature where any are known, else over the speed, so that curves through the known
+    ones are not drawn aside.
+    """
+    found = values.copy()
+    for state in np.ndindex(found.shape[:2]):
+        known = np.isfinite(found[state][0, 0])
+        if known.any() and not known.all():
+            found[state][..., ~known] = found[state][..., known] @ _smoothest(known).T
+    whole = np.isfinite(found).all(axis=(2, 3, 4))
+    for row, column in np.argwhere(~whole):
+        near = np.flatnonzero(whole[:, column])
+        weights = [np.interp(log_speeds[row], log_speeds[near], one) for one in np.eye(len(near))]
+        found[row, column] = np.tensordot(weights, found[near, column], axes=1)
+    return found
+
+
+def _smoothest(known: NDArray[np.bool_]) -> Array:
+    """Missing values of known ones, (n_missing, n_known): those whose polynomial has the least high terms."""
+    nodes = chebyshev_nodes(-1.0, 1.0, len(known))
+    terms = np.linalg.inv(chebvander(nodes, len(known) - 1)) * np.arange(len(known))[:, None] ** 2.0
+    return np.linalg.lstsq(terms[:, ~known], -terms[:, known])[0]
+
+
+def _beside(points: Array, values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Positions of the points below and above each value; one twice where it is there, or beyond the ends."""
+    last = len(points) - 1
+    above = np.minimum(np.searchsorted(points, values, side="left"), last)
+    return np.clip(np.searchsorted(points, values, side="right") - 1, 0, last), above
 
 
 def _log_quantities(curves: FilmCurves, speed: float) -> Array:

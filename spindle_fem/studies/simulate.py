@@ -18,7 +18,7 @@ from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.inference.calibration import Calibration, prediction_interval
 from spindle_fem.inference.calibration import calibrate as fit_parameters
 from spindle_fem.inference.coordinate_names import START_PREFIX
-from spindle_fem.inference.followed_model import preload_along, with_followed_preload
+from spindle_fem.inference.followed_model import preload_along, require_solved_friction, with_followed_preload
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.reading_noise import SlowError
 from spindle_fem.model.lumped.written_network import build_network, value_in_definition
@@ -133,6 +133,7 @@ def _simulate_geometry(
         predictor = Predictor(fast, [recording], effects=effects, at_stamps=True, drives=drives)
         outside = _outside_range(predictor, factors)
     progress("simulation")
+    require_solved_friction(fast, [recording], effects, factors)
     predicted, half_width = _prediction(predictor, result)
     notes = [*predictor.drives[0].notes, *_effect_notes(effects)]
     if fast.inputs.extra_terms:

@@ -87,7 +87,7 @@ def friction(spec):
     speeds = np.array([10.0, 400.0])
     still = np.zeros((1, len(names), 3, 4))
     turning = CubicSpline(np.log(speeds), np.zeros((2, *still.shape)))
-    return FrictionMap(names, speeds, np.array([1750.0]), turning, still, None)
+    return FrictionMap(names, speeds, np.array([1750.0]), turning, still, None, {})
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,10 @@ from scipy.interpolate import CubicSpline
 from spindle_fem.definition.load import load_machine
 from spindle_fem.effects.framework.term import TermContext
 from spindle_fem.errors import NoEquilibriumError, OutOfValidityError, SpecError
+from spindle_fem.inference import followed_model
 from spindle_fem.model.reduced.drive import with_walls
 from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tabulated_machine
+from spindle_fem.model.reduced.followed_preload import MountedRun
 from spindle_fem.model.reduced.reduced_transient import simulate_fast
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.bearing_heat import BearingMechanics, heat_of_table
@@ -180,9 +182,91 @@ def test_bearings_that_cannot_be_tabulated_are_refused_with_their_state(spec, mo
         raise NoEquilibriumError("F1", "gross sliding.", "Raise preload.")
 
     monkeypatch.setattr(BearingMechanics, "over_film_temperature", refuse)
-    words = r"gross sliding\. .* at 4 rpm, 875 N of thrust and films of 5 to 95 °C, at the size of assembly"
+    words = r"gross sliding\. .* near 4 rpm, 875 N of thrust and a film of 5 °C, at the size of assembly"
     with pytest.raises(NoEquilibriumError, match=words):
         tabulate_friction(spec, 4500.0 * RPM, THRUSTS)
+
+
+@pytest.fixture(scope="module")
+def with_cold_states_refused(spec):
+    """The map of bearings that slide in films below 15 °C at 300 to 400 rpm, and at 200 rpm in any."""
+    solve = BearingMechanics.over_film_temperature
+
+    def slide(self, point, kelvin):
+        rpm = point.speed / RPM
+        if (300.0 < rpm < 400.0 and np.min(kelvin) < 288.15) or 150.0 < rpm < 200.0:
+            raise NoEquilibriumError("F1", "gross sliding.", "Raise preload.")
+        return solve(self, point, kelvin)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(BearingMechanics, "over_film_temperature", slide)
+        return tabulate_friction(spec, 4500.0 * RPM, [1750.0])
+
+
+def test_a_map_lacks_states_that_the_bearings_have_not_and_is_right_beside_them(
+    friction, with_cold_states_refused
+):
+    """Of a map to 4500 rpm 180 and 360 rpm are two of its speeds."""
+    holed = with_cold_states_refused
+    assert {round(holed.speed[row] / RPM) for row, _, _ in holed.refused} == {180, 360}
+    assert {film for row, _, film in holed.refused if holed.speed[row] > 200.0 * RPM} == {0, 1, 2}
+    for rpm, celsius, within in ((360.0, 40.0, 2e-3), (600.0, 8.0, 5e-3), (90.0, 8.0, 1e-9)):
+        film = np.full(len(friction.bearings), celsius + 273.15)
+        expected = friction.heat(rpm * RPM, 1750.0, film)
+        assert holed.heat(rpm * RPM, 1750.0, film) == pytest.approx(expected, rel=within)
+
+
+@pytest.mark.parametrize(
+    ("rpm", "coldest", "state"),
+    [
+        (360.0, 10.0, "360 rpm, 1750 N of thrust and a film of 8 °C"),
+        (300.0, 60.0, "180 rpm, 1750 N of thrust and a film of 44 °C"),
+        (360.0, 30.0, None),
+        (0.0, 8.0, None),
+        (80.0, 8.0, None),
+    ],
+)
+def test_only_a_run_that_comes_to_a_state_without_equilibrium_is_refused(
+    with_cold_states_refused, rpm, coldest, state
+):
+    films = np.full((len(with_cold_states_refused.bearings), 3), 323.15)
+    films[1, 2] = coldest + 273.15
+    speed, thrust = np.array([3000.0, 2000.0, rpm]) * RPM, np.full(3, 1750.0)
+    if state is None:
+        with_cold_states_refused.require_solved(speed, thrust, films)
+        return
+    with pytest.raises(NoEquilibriumError, match=f"gross sliding.*near {state}, at the size of assembly"):
+        with_cold_states_refused.require_solved(speed, thrust, films)
+
+
+@pytest.mark.parametrize("speed", [360.0 * RPM, 3000.0 * RPM])
+def test_a_recording_is_refused_where_its_run_comes_to_such_a_state(
+    spec, with_cold_states_refused, monkeypatch, speed
+):
+    holed = with_cold_states_refused
+    term = FilmHeat(holed, spec, tabulated_machine(spec, holed))
+    fast = SimpleNamespace(
+        inputs=SimpleNamespace(extra_terms=(term,)), model=SimpleNamespace(place=lambda name: np.ones(1))
+    )
+    cold_then_warm = MountedRun(
+        np.zeros(2), np.array([[283.15], [323.15]]), np.array([speed, 3000.0 * RPM]), np.full(2, 1750.0)
+    )
+    monkeypatch.setattr(followed_model, "Predictor", lambda *given, **named: None)
+    monkeypatch.setattr(followed_model, "_run", lambda predictor, number, factors: cold_then_warm)
+    if speed > 1000.0 * RPM:
+        followed_model.require_solved_friction(fast, [None], None)
+        return
+    with pytest.raises(NoEquilibriumError, match="near 360 rpm, 1750 N of thrust and a film of 8 °C"):
+        followed_model.require_solved_friction(fast, [None], None)
+    # Bearings that follow expansion have states of their own.
+    term.preload = object()
+    followed_model.require_solved_friction(fast, [None], None)
+
+
+def test_tables_of_a_map_are_given_where_it_is_whole(friction, with_cold_states_refused):
+    friction.require_complete()
+    with pytest.raises(NoEquilibriumError, match="gross sliding"):
+        with_cold_states_refused.require_complete()
 
 
 @pytest.mark.parametrize(

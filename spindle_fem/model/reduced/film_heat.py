@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from spindle_fem.definition.machine_spec import HeatTable, MachineSpec
 from spindle_fem.effects.framework.term import Operating, Term, TermContext
 from spindle_fem.model.reduced.build_reduced import ReductionOptions
+from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.followed_preload import FollowedPreload
 from spindle_fem.model.thermal_model import ThermalModel
 from spindle_fem.operation.friction_map import (
@@ -167,6 +168,11 @@ class FilmHeat(Term):
             for row in self.follow
             for column, side in enumerate(("inner", "outer"))
         }
+
+
+def film_heat_of(fast: FastModel) -> FilmHeat | None:
+    """The term that brings friction and ball rows to their films, where there is one."""
+    return next((term for term in fast.inputs.extra_terms if isinstance(term, FilmHeat)), None)
 
 
 def tabulated_machine(spec: MachineSpec, friction_map: FrictionMap) -> MachineSpec:

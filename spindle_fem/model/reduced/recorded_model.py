@@ -10,7 +10,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.uncertain_parameters import with_parameters
 from spindle_fem.model.reduced.build_reduced import ReductionOptions, reduced_model_of
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine, tabulated_machine
+from spindle_fem.model.reduced.film_heat import FilmHeat, film_heat_of, operators_machine, tabulated_machine
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.friction_map import needs_map, tabulate_friction, thrusts_between
 from spindle_fem.recordings.align import Recording
@@ -85,7 +85,7 @@ def recentred_model(
 ) -> FastModel:
     """The machine with a reduced model made at the given factors."""
     terms = fast.inputs.extra_terms
-    film_heat = next((term for term in terms if isinstance(term, FilmHeat)), None)
+    film_heat = film_heat_of(fast)
     made_of = fast.spec if film_heat is None else operators_machine(fast.spec, film_heat)
     model = reduced_model_of(with_parameters(made_of, factors), options=options, progress=progress)
     return fast_spindle(model, fast.spec, terms)

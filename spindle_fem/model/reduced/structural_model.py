@@ -26,7 +26,7 @@ from spindle_fem.model.mesh.moved_faces import MovableMesh
 from spindle_fem.model.reduced.build_reduced import SHIFTS, nominal_channel_film, physical_loads
 from spindle_fem.model.reduced.class_operators import NO_CHANGES, ClassOperators
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.film_heat import FilmHeat, operators_machine
+from spindle_fem.model.reduced.film_heat import film_heat_of, operators_machine
 from spindle_fem.model.reduced.mesh_model import MeshModel, build_mesh_model
 from spindle_fem.model.reduced.reduced_cache import reduced_digest
 from spindle_fem.model.reduced.snapshots import Sample, SnapshotSpace
@@ -238,7 +238,7 @@ def structural_model_of(fast: FastModel, progress: Progress = lambda stage: None
         Of a machine with geometry.
     """
     terms = fast.inputs.extra_terms
-    film_heat = next((term for term in terms if isinstance(term, FilmHeat)), None)
+    film_heat = film_heat_of(fast)
     made_of = fast.spec if film_heat is None else operators_machine(fast.spec, film_heat)
     coarse = made_of.model_copy(update={"mesh": made_of.mesh.model_copy(update=COARSE)})
     model, changes, directions = _projected(coarse, progress)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import NaturalFilm
 from spindle_fem.model.reduced.fast_model import FastModel
-from spindle_fem.model.reduced.film_heat import FilmHeat
+from spindle_fem.model.reduced.film_heat import film_heat_of
 from spindle_fem.operation.coefficients import film_coefficient, fluid_temperature, natural_reference
 from spindle_fem.operation.friction_map import CONDUCTANCES, FILM_TEMPERATURES, MOMENT
 from spindle_fem.operation.operating_point import OperatingPoint
@@ -27,11 +27,6 @@ TOLERANCE = 1e-4
 WALL_RANGE, SURROUNDINGS_RANGE = (-60.0, 120.0), (-10.0, 50.0)
 # Raceways and balls count for the temperature of a film.
 FILM_SHARES = (0.25, 0.25, 0.5)
-
-
-def film_heat_of(fast: FastModel) -> FilmHeat | None:
-    """The term that brings friction and ball rows to their films, where there is one."""
-    return next((term for term in fast.inputs.extra_terms if isinstance(term, FilmHeat)), None)
 
 
 def preload_of(fast: FastModel) -> ExportedPreload | None:

@@ -9,6 +9,7 @@ from spindle_fem.definition.machine_spec import MachineSpec, NaturalFilm
 from spindle_fem.model.reduced.defined_effects import NO_EFFECTS, ActiveEffects
 from spindle_fem.model.reduced.drive import LARGEST_STEP, STANDARD
 from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.film_heat import film_heat_of
 from spindle_fem.model.reduced.resolved_jumps import least_jump, rule_of_jumps
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.physics.coolant.properties import coolant_by_name
@@ -25,7 +26,6 @@ from spindle_fem.studies.export.effect_export import ExportedEffects, heat_table
 from spindle_fem.studies.export.feedback_export import (
     SURROUNDINGS_RANGE,
     feedback_tables,
-    film_heat_of,
     preload_of,
 )
 from spindle_fem.studies.export.operator_tables import PARTS, changes_at, circuit_table, speed_table
@@ -91,6 +91,8 @@ def _state_space(
     spec = fast.spec
     nominal = OperatingPoint.of(spec)
     film_heat = film_heat_of(fast)
+    if film_heat is not None and film_heat.preload is None:
+        film_heat.friction_map.require_complete()
     inputs = _inputs(fast, highest_speed)
     sources = source_loads(spec, inputs)
     effect_tables = heat_tables(effects, inputs)

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from spindle_fem.effects.framework.term import CHANNEL_FILM
 from spindle_fem.model.reduced.class_operators import NO_CHANGES
 from spindle_fem.model.reduced.fast_model import FastModel
+from spindle_fem.model.reduced.film_heat import film_heat_of
 from spindle_fem.operation.operating_point import OperatingPoint
 from spindle_fem.studies.export.effect_export import ExportedEffects
-from spindle_fem.studies.export.feedback_export import film_heat_of
 from spindle_fem.studies.export.interpolation_axes import refined_axis, values_on
 
 Array = NDArray[np.float64]
