@@ -215,7 +215,7 @@ def _films(content: dict[str, Any], drawn: _Drawn) -> Iterator[tuple[str, str]]:
         size = in_millimetres(2 * max(piece.r[1] for piece in pieces))
         film: dict[str, Any] = {"name": name, "surface": [name], "marks": "A"}
         if turns:
-            law = "becker" if kind == "cylinder" else "disc"
+            law = "cylinder" if kind == "cylinder" else "disc"
             film |= {"kind": "rotating", "correlation": law, "diameter": size, "minimum": "10 W/m**2/K"}
             shape = "cylinder" if kind == "cylinder" else "end face"
             what = f"rotating {shape} of {size} diameter: {law}, at least 10 W/(m²·K)"

@@ -15,8 +15,10 @@ from spindle_fem.machine.geometry.assembly import build_assembly
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.operation.driven_flow import channel_warnings
 from spindle_fem.operation.operating_limits import lost_to_air, speeds_beyond_catalogues
+from spindle_fem.physics.surroundings.rotating_surfaces import rotating_film
 from spindle_fem.report import run_report
 from spindle_fem.studies.heat_study import RPM, usual_speeds
+from spindle_fem.studies.sweep.prepared_study import prepare_study
 from spindle_fem.units import Uncertain
 from spindle_fem.validity import CHANGES_RESULT, CodedWarning, by_consequence
 from tests.support import page_machine
@@ -56,6 +58,59 @@ def test_outer_faces_lose_heat_and_inner_ones_do_not(page) -> None:
         3.14159 * (0.28 * 0.02 + 0.23 * 0.326), rel=1e-4
     )
     assert area["workshop_gap_1.turning"] == pytest.approx(3.14159 * 0.098 * 0.15, rel=1e-4)
+
+
+def test_turning_films_are_known_at_the_highest_speeds_of_machines_that_ship() -> None:
+    for name in ("motor_spindle", "grinding_spindle", "externally_driven"):
+        spec = load_machine(name)
+        turning = [film for film in spec.film if film.kind == "rotating"]
+        assert len(turning) > 2
+        for film in turning:
+            found = rotating_film(film.correlation, spec.highest_speed, film.diameter, minimum=film.minimum)
+            assert found.in_range, (name, film.name)
+
+
+def test_values_that_the_rules_add_are_set_and_the_others_follow_the_geometry() -> None:
+    longer = ["joint.workshop_inner_seats.conductance=5000 W/m**2/K",
+              "joint.workshop_inner_seats.conductance.sigma_rel=0.1",
+              "film.workshop_shaft_cylinder.minimum=12 W/m**2/K",
+              "part.shaft.segment.nose.outer_diameter=86 mm"]  # fmt: skip
+    usual, spec = load_machine(PAGE), load_machine(PAGE, longer)
+    before, after = (
+        next(group for group in item.joint if group.name == "workshop_inner_seats") for item in (usual, spec)
+    )
+    assert after.conductance == Uncertain(5000.0, pytest.approx(0.1))
+    assert after.marks == {"default": "A", "conductance": "U"}
+    assert after.contacts == before.contacts
+    film = next(film for film in spec.film if film.name == "workshop_shaft_cylinder")
+    assert (film.minimum, film.diameter) == (12.0, 0.086)
+    assert after != before
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("joint.workshop_iner_seats.conductance=1 W/m**2/K", 'Did you mean "workshop_inner_seats"'),
+        ("joint.workshop_inner_seats.conductanc=1 W/m**2/K", 'Did you mean "conductance"'),
+        ("joint.workshop_inner_seats=none", 'is given by surroundings = "workshop"'),
+        ("film.workshop_shaft_cylinder.minimum=none", "Set another value"),
+    ],
+)
+def test_what_cannot_be_set_of_the_rules_is_refused(override, words) -> None:
+    with pytest.raises(FaultsError, match=words):
+        load_machine(PAGE, [override])
+
+
+def test_a_study_varies_what_the_rules_add(tmp_path) -> None:
+    study = tmp_path / "seats.toml"
+    study.write_text(
+        'schema = "spindle-fem/study/1"\nname = "Seats"\n[study]\noutputs = ["temperature.max_degC"]\n'
+        '[[parameter]]\npath = "joint.workshop_inner_seats.conductance"\n'
+        'values = ["5000 W/m**2/K", "20000 W/m**2/K"]\n'
+    )
+    tasks = prepare_study(PAGE, study).tasks
+    groups = [next(g for g in task.spec.joint if g.name == "workshop_inner_seats") for task in tasks]
+    assert [group.conductance.value for group in groups][:2] == [5000.0, 20000.0]
 
 
 def test_what_the_file_gives_is_kept(page) -> None:

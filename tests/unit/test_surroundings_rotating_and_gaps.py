@@ -10,6 +10,7 @@ from spindle_fem.physics.surroundings.gap_laws.becker_kaye import (
 from spindle_fem.physics.surroundings.gap_laws.power_law import gap_coefficient_power_law
 from spindle_fem.physics.surroundings.rotating_films import ROTATING_FILMS
 from spindle_fem.physics.surroundings.rotating_films.becker import nusselt_becker
+from spindle_fem.physics.surroundings.rotating_films.cylinder import nusselt_cylinder
 from spindle_fem.physics.surroundings.rotating_films.disc import nusselt_rotating_disc
 from spindle_fem.physics.surroundings.rotating_films.dropkin_carmi import nusselt_dropkin_carmi
 from spindle_fem.physics.surroundings.rotating_surfaces import rotating_film, rotational_reynolds
@@ -47,6 +48,21 @@ def test_becker_and_dropkin_agree_where_both_are_valid():
     # Two independent experiments in air: within 25 % of each other over their common range.
     reynolds = np.array([1e4, 3e4, 1e5])
     np.testing.assert_allclose(nusselt_becker(reynolds), nusselt_dropkin_carmi(reynolds), rtol=0.25)
+
+
+def test_a_cylinder_passes_from_becker_to_dropkin_and_carmi_where_both_are_valid():
+    slow, fast = np.array([800.0, 3e3, 8e3]), np.array([1e5, 2e5, 4.3e5])
+    np.testing.assert_allclose(nusselt_cylinder(slow), nusselt_becker(slow))
+    np.testing.assert_allclose(nusselt_cylinder(fast), nusselt_dropkin_carmi(fast))
+    both = np.geomspace(8.1e3, 0.99e5, 20)
+    assert np.all(nusselt_cylinder(both) < nusselt_becker(both))
+    assert np.all(nusselt_cylinder(both) > nusselt_dropkin_carmi(both))
+    whole = nusselt_cylinder(np.geomspace(800.0, 4.3e5, 2000))
+    # The Reynolds number rises by 0.3 % from one to the next.
+    assert np.all((np.diff(whole) > 0.0) & (np.diff(whole) < 0.003 * whole[1:]))
+    # 80 mm at 9000 rpm: beyond Becker, not beyond these.
+    assert not rotating_film("becker", 9000 * RPM, 0.08).in_range
+    assert rotating_film("cylinder", 9000 * RPM, 0.08).warnings == ()
 
 
 def test_disc_branches_meet_and_tend_to_the_turbulent_law():
