@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -12,6 +14,7 @@ from spindle_fem.definition.load import load_machine
 from spindle_fem.model.elastic.deformed_shape import still_place
 from spindle_fem.report import run_tables
 from spindle_fem.report.balance_charts import heat_balance
+from spindle_fem.report.block_page import Section, render_document
 from spindle_fem.report.heat_charts import loads_over_thrust
 from spindle_fem.report.machine_drawing import part_colours
 from spindle_fem.report.run_report import _fitted
@@ -58,6 +61,21 @@ def test_a_bearing_without_preload_shows_what_it_carries():
     table = run_tables.bearing_table({"bearings": states})
     shown = dict(zip([item["title"] for item in table.columns], table.rows[0]["cells"], strict=True))
     assert (shown["preload / N"], shown["axial load / N"]) == (MISSING, "183")
+
+
+def test_the_table_of_bearings_fits_beside_the_contents_of_a_screen_of_1280_pixels():
+    """Letters of the page's bold type are 8.3 pixels wide in the mean; contents and margins take 312."""
+    states = {name: {"heat_W": 109.7, "preload_N": 13075.0, "film_um": 0.98} for name in ("F1", "R1")}
+    page = render_document(
+        "Run", "Machine", [Section("bearings", "Bearings", [run_tables.bearing_table({"bearings": states})])]
+    )
+    heads = re.findall(r"<th scope=\"col\"[^>]*>(.*?)</th>", page)
+    assert len(heads) == 12
+    # What stands between two places where a line may break.
+    narrowest = sum(max(map(len, html.unescape(head).split(" "))) for head in heads)
+    padding = 16 * 2 * 0.5
+    assert 8.3 * narrowest + len(heads) * padding < 1280 - 312
+    assert html.unescape(heads[4]) == "outer race /\u00a0°C"
 
 
 def test_a_ring_without_a_fit_has_no_pressure_and_no_gap():
