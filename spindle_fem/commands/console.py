@@ -336,9 +336,9 @@ def print_sweep(content: dict[str, Any], folder: Path) -> None:
     for key, value in content.items():
         if isinstance(value, (str, int, float)) and key != "schema":
             console.print(f"{key.replace('_', ' ')}: {value}")
-    for line in _best_designs(content):
+    files = f"Table: {folder / 'results.csv'}; report: {folder / 'report.html'}"
+    for line in (*_best_designs(content), files):
         console.print(line)
-    console.print(f"Table: {folder / 'results.csv'}; report: {folder / 'report.html'}")
 
 
 def _best_designs(content: dict[str, Any]) -> list[str]:
@@ -351,9 +351,8 @@ def _best_designs(content: dict[str, Any]) -> list[str]:
     optimum = content["optimum"]
     if optimum is None:
         return [f"best ({wanted}): none of the solved designs keeps every limit"]
-    if optimum["best"] is None:
+    if (best := optimum["best"]) is None:
         return [f"front ({wanted}): designs {', '.join(map(str, optimum['front']))}"]
-    best = optimum["best"]
     scales = {
         item["path"]: scale_of_column(item["path"], item["unit"], ())
         for item in (*content["parameters"], *content["outputs"])
@@ -365,9 +364,11 @@ def _best_designs(content: dict[str, Any]) -> list[str]:
             f"{path} = {scale.text(value)} {scale.unit}".rstrip() for path, scale, value in shown
         )
 
+    alike = ", ".join(map(str, optimum["within_mesh_error"])) or "none"
     return [
         f"best ({wanted}): design {best['design']}, {listed(best['parameters'])}",
         f"  there {listed(best['outputs'])}",
+        f"  as good within the mesh's error: {alike}",
     ]
 
 

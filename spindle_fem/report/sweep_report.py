@@ -37,6 +37,8 @@ FIGURE_FOLDER = "figures"
 # Outputs drawn as maps and as columns; the table has all of them.
 MOST_PANELS = 6
 BEST_PICTURE = "best_designs.png"
+# Designs listed that are as good as the best within the mesh's error.
+MOST_ALIKE = 12
 
 _CAPTIONS = {
     "responses": "Outputs over the parameters that move them most. Dots are solved designs, crosses break "
@@ -280,6 +282,8 @@ def _optimum(
     optimum = summary["optimum"]
     by_number = {row["design"]: row for row in rows}
     open_ones = [n for n in optimum["not_certainly_worse"] if n not in optimum["front"]]
+    # Folders of earlier versions lack the key.
+    alike = optimum.get("within_mesh_error", [])
     blocks: list[Any] = []
     if len(summary["objectives"]) == 1:
         text = f"Design {optimum['front'][0]} is best of those that keep every limit"
@@ -296,14 +300,28 @@ def _optimum(
             if summary["film_uncertainty"]
             else "."
         )
-        blocks.append(Notice(text + sure, "good"))
+        blocks.append(Notice(text + sure, "" if alike else "good"))
+    if alike:
+        blocks.append(Notice(_alike_words(len(alike), summary["mesh_error_K"])))
     lines = [("best", n) for n in optimum["front"]]
+    lines += [("as good within the mesh's error", n) for n in alike[:MOST_ALIKE]]
     lines += [(name, item["design"]) for name, item in summary["references"].items()]
-    lines += [("neighbour of the best", item["design"]) for item in optimum["neighbours"]]
+    near = [item["design"] for item in optimum["neighbours"]]
+    lines += [("neighbour of the best", number) for number in near if number not in alike[:MOST_ALIKE]]
     fields = (words("what", "what"), *_fields(parameters, outputs))
     compared = [{"what": what, **by_number[n]} for what, n in lines]
     caption = "The best designs, those to compare with, and the nearest ones solved."
     return [*blocks, table_of(fields, compared, caption)]
+
+
+def _alike_words(number: int, error: float) -> str:
+    """What to think of designs that are nearer to the best ones than the mesh's error."""
+    many = "1 design more is" if number == 1 else f"{number} designs more are"
+    return (
+        f"{many} as good as far as this mesh tells: temperatures of designs with meshes of their own may "
+        f"differ by {error:g} K because of the mesh alone. Which of them is best, a finer mesh or the other "
+        "outputs decide."
+    )
 
 
 def _fields(parameters: Sequence[Scale], outputs: Sequence[Scale]) -> tuple[Field, ...]:

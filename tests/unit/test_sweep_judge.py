@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from spindle_fem.commands.console import _best_designs
 from spindle_fem.definition.load import load_machine
 from spindle_fem.errors import SpecError, UnitError
 from spindle_fem.studies.sweep.designs import Axis
@@ -23,7 +24,14 @@ from spindle_fem.studies.sweep.study_file import Study
 
 
 def row(number, **values):
-    return {"design": number, "status": "ok", "reason": "", "feasible": "yes", **values}
+    return {
+        "design": number,
+        "status": "ok",
+        "reason": "",
+        "feasible": "yes",
+        "geometry": str(number),
+        **values,
+    }
 
 
 def test_limits_hold_at_every_end_of_the_film():
@@ -76,18 +84,39 @@ def test_better_only_when_it_is_so_within_the_band():
         row(3, a_K=3.0) | band | {"a_K@film_low": 3.5, "a_K@film_high": 2.0},
         row(4, a_K=0.0) | band | {"feasible": "no"},
     ]
-    ranking = rank(study(True, a_K="minimize"), rows)
+    ranking = rank(study(True, a_K="minimize"), rows, 0.0)
     assert [ranking.rows[i]["design"] for i in ranking.front] == [1]
     assert [ranking.rows[i]["design"] for i in ranking.contenders] == [1, 2]
-    without = rank(study(False, a_K="minimize"), rows)
+    without = rank(study(False, a_K="minimize"), rows, 0.0)
     assert [without.rows[i]["design"] for i in without.contenders] == [1]
-    upwards = rank(study(False, a_K="maximize"), rows)
+    upwards = rank(study(False, a_K="maximize"), rows, 0.0)
     assert [upwards.rows[i]["design"] for i in upwards.front] == [3]
 
 
 def test_no_ranking_without_objectives_or_feasible_designs():
-    assert rank(study(False), [row(1, a_K=1.0)]) is None
-    assert rank(study(False, a_K="minimize"), [row(1, a_K=1.0) | {"feasible": "no"}]) is None
+    assert rank(study(False), [row(1, a_K=1.0)], 0.03) is None
+    assert rank(study(False, a_K="minimize"), [row(1, a_K=1.0) | {"feasible": "no"}], 0.03) is None
+
+
+def test_designs_nearer_than_the_meshes_error_are_as_good_unless_they_share_the_mesh():
+    rows = [
+        row(1, a_K=1.00, p_Pa=5.0),
+        row(2, a_K=1.02, p_Pa=5.0),
+        row(3, a_K=1.02, p_Pa=5.0) | {"geometry": "1"},
+        row(4, a_K=1.04, p_Pa=5.0),
+        row(5, a_K=1.01, p_Pa=6.0),
+        row(6, a_K=1.02, p_Pa=4.0) | {"feasible": "no"},
+    ]
+
+    def told(mesh_error, **directions):
+        ranking = rank(study(False, **directions), rows, mesh_error)
+        return [[ranking.rows[i]["design"] for i in found] for found in (ranking.front, ranking.alike)]
+
+    assert told(0.03, a_K="minimize") == [[1], [2, 5]]
+    assert told(0.0, a_K="minimize") == [[1], []]
+    # A pressure does not follow from the mesh: 5 is worse for certain.
+    assert told(0.03, a_K="minimize", p_Pa="minimize") == [[1], [2]]
+    assert told(0.03, p_Pa="maximize") == [[5], []]
 
 
 def axis(path, sampled=False):
@@ -198,3 +227,15 @@ def test_what_a_stream_does_is_an_output_of_machines_with_streams():
     assert unit_of(f"{stem}.pressure_drop_Pa").text == "Pa"
     assert unit_of(f"{stem}.outlet_degC").text == "°C"
     assert not any(path.startswith("circuits.") for path in output_paths(load_machine("uncooled")))
+
+
+def test_the_terminal_says_which_designs_are_as_good():
+    content = {
+        "objectives": [{"output": "a_K", "direction": "minimize"}],
+        "parameters": [],
+        "outputs": [{"path": "a_K", "unit": "K"}],
+        "optimum": {"best": {"design": 1, "parameters": {}, "outputs": {"a_K": 1.0}}},
+    }
+    for alike, said in (([], "none"), ([2, 5], "2, 5")):
+        content["optimum"]["within_mesh_error"] = alike
+        assert _best_designs(content)[-1].endswith(f"as good within the mesh's error: {said}")

@@ -16,6 +16,10 @@ from spindle_fem.studies.sweep.study_file import Study
 
 # Differences below this share of the spread of an objective are round-off.
 ROUND_OFF = 1.0e-9
+# K; what temperatures of designs on meshes of their own differ by because of the mesh, by the order of the
+# elements: linear ones against quadratic ones, and the coarse preset of these against the normal one
+# (docs/modelling.md, "Elements").
+MESH_ERROR = {1: 0.3, 2: 0.03}
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +96,8 @@ class Ranking:
         objective, the Pareto front for several; by the first objective.
     certain : (n,) ndarray of bool
         Whether some row beats this one whatever the film is within its band.
+    alike : tuple of int
+        Rows beside the front that others beat by no more than the mesh leaves.
     """
 
     rows: tuple[Row, ...]
@@ -100,6 +106,7 @@ class Ranking:
     high: NDArray[np.float64]
     front: tuple[int, ...]
     certain: NDArray[np.bool_]
+    alike: tuple[int, ...]
 
     @property
     def contenders(self) -> tuple[int, ...]:
@@ -107,8 +114,15 @@ class Ranking:
         return tuple(np.flatnonzero(~self.certain).tolist())
 
 
-def rank(study: Study, rows: Sequence[Row]) -> Ranking | None:
-    """Judge the feasible rows; None without objectives or without such rows."""
+def rank(study: Study, rows: Sequence[Row], mesh_error: float) -> Ranking | None:
+    """Judge the feasible rows; None without objectives or without such rows.
+
+    Parameters
+    ----------
+    mesh_error : float, [K]
+        Of objectives that are temperatures, between designs of different geometries; those of one share
+        their mesh with its error.
+    """
     signs = [1.0 if item.direction == "minimize" else -1.0 for item in study.objective]
     feasible = tuple(
         row
@@ -132,20 +146,37 @@ def rank(study: Study, rows: Sequence[Row]) -> Ranking | None:
     beaten = dominated(values)
     front = [int(index) for index in np.flatnonzero(~beaten)]
     front.sort(key=lambda index: tuple(values[index]))
-    return Ranking(feasible, values, low, high, tuple(front), certainly_beaten(low, high))
+    errors = [mesh_error if unit_of(item.output).text in ("K", "°C") else 0.0 for item in study.objective]
+    told = dominated(values, np.array(errors), np.array([str(row["geometry"]) for row in feasible]))
+    alike = tuple(np.flatnonzero(beaten & ~told).tolist())
+    return Ranking(feasible, values, low, high, tuple(front), certainly_beaten(low, high), alike)
 
 
-def dominated(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def dominated(
+    values: NDArray[np.float64],
+    errors: NDArray[np.float64] | float = 0.0,
+    meshes: NDArray[np.str_] | None = None,
+) -> NDArray[np.bool_]:
     """Rows that another one equals or beats in every objective and beats in one; smaller is better.
+
+    Parameters
+    ----------
+    values : (n, m) ndarray
+    errors : (m,) ndarray, optional
+        By how much more a row has to be better where the two have not the same mesh.
+    meshes : (n,) ndarray of str, optional
+        All the same where none are given.
 
     >>> dominated(np.array([[1.0, 2.0], [2.0, 1.0], [2.0, 2.0]])).tolist()
     [False, False, True]
     """
     tolerance = ROUND_OFF * np.maximum(np.ptp(values, axis=0), np.finfo(float).tiny)
     found = np.zeros(len(values), dtype=bool)
+    meshes = np.zeros(len(values)) if meshes is None else meshes
     for index, value in enumerate(values):
         not_worse = np.all(values <= value + tolerance, axis=1)
-        better = np.any(values < value - tolerance, axis=1)
+        margin = tolerance + errors * (meshes != meshes[index])[:, None]
+        better = np.any(values < value - margin, axis=1)
         found[index] = bool(np.any(not_worse & better))
     return found
 

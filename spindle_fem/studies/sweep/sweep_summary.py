@@ -7,7 +7,7 @@ from typing import Any
 
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.studies.sweep.file_names import SWEEP_SCHEMA
-from spindle_fem.studies.sweep.judge_designs import Ranking, rank
+from spindle_fem.studies.sweep.judge_designs import MESH_ERROR, Ranking, rank
 from spindle_fem.studies.sweep.outputs import unit_of
 from spindle_fem.studies.sweep.prepared_study import PreparedStudy
 from spindle_fem.studies.sweep.results_table import FAILED, FULL, IMPOSSIBLE, MOVED, NEW, OK, REDUCED, Row
@@ -22,7 +22,8 @@ PICTURES = 4
 def summarise(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> dict[str, Any]:
     """Counts, the best designs, what they are compared with, and what matters."""
     statuses = [row["status"] for row in rows]
-    ranking = rank(prepared.study, rows)
+    mesh_error = MESH_ERROR[prepared.spec.mesh.order]
+    ranking = rank(prepared.study, rows, mesh_error)
     numbers = [
         *dict.fromkeys((*(item.output for item in prepared.study.objective), *prepared.question.outputs))
     ]
@@ -44,6 +45,7 @@ def summarise(prepared: PreparedStudy, rows: Sequence[Row], *, reused: int) -> d
         "feasible": sum(row["feasible"] == "yes" for row in rows),
         "geometries": len({row["geometry"] for row in rows if row["geometry"]}),
         "meshes": {how: sum(row["mesh"] == how for row in rows) for how in (NEW, MOVED)},
+        "mesh_error_K": mesh_error,
         "reused_rows": reused,
         "backends": _backends(rows),
         "optimum": None if ranking is None else _optimum(prepared, rows, ranking),
@@ -96,6 +98,7 @@ def _optimum(prepared: PreparedStudy, rows: Sequence[Row], ranking: Ranking) -> 
         "best": _design(prepared, best) if len(prepared.study.objective) == 1 else None,
         "front": [ranking.rows[index]["design"] for index in ranking.front],
         "not_certainly_worse": [ranking.rows[index]["design"] for index in ranking.contenders],
+        "within_mesh_error": [ranking.rows[index]["design"] for index in ranking.alike],
         "neighbours": [
             _design(prepared, row)
             for row in neighbours(prepared.axes, rows, best, NEIGHBOURS * len(prepared.axes))
