@@ -9,7 +9,7 @@ speed and thrust; :class:`FrictionMap` joins series over speeds and thrusts.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,6 +117,29 @@ class FilmSeries:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FrictionStates:
+    """Solved states of a map's bearings.
+
+    Attributes
+    ----------
+    speed : (n_speeds,) ndarray, [rad/s]
+    thrust : (n_thrusts,) ndarray, [N]
+    turning : (n_speeds, n_thrusts, n_bearings, 3, n_t) ndarray
+        Logarithms of the moment before its factor and of both conductances; nan where refused.
+    at_rest : (n_thrusts, n_bearings, 3, n_t) ndarray
+        The same at standstill; logarithms of the moment are 0.
+    refused : mapping of State to SpindleFemError
+        Why there are none, where there are none.
+    """
+
+    speed: Array
+    thrust: Array
+    turning: Array
+    at_rest: Array
+    refused: Mapping[State, SpindleFemError]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class FrictionMap:
     """Friction moment and ball conductance of every bearing over speed, thrust and film temperature.
 
@@ -144,6 +167,19 @@ class FrictionMap:
     at_rest: Array
     shares: CubicSpline | None
     refused: Mapping[State, SpindleFemError]
+
+    @classmethod
+    def through(cls, spec: MachineSpec, states: FrictionStates) -> FrictionMap:
+        """Map of a machine's solved bearings."""
+        kelvin = chebyshev_nodes(*FILM_TEMPERATURES, TEMPERATURE_POINTS)
+        names = tuple(bearing.name for _, bearing in spec.bearings)
+        over, thrust = np.log(states.speed), states.thrust
+        turning, still = (
+            FilmSeries.through(kelvin, values, *FILM_TEMPERATURES).coefficients
+            for values in (_continued(states.turning, over), states.at_rest)
+        )
+        shares = CubicSpline(thrust, np.eye(len(thrust))) if len(thrust) > 1 else None
+        return cls(names, states.speed, thrust, CubicSpline(over, turning), still, shares, states.refused)
 
     def at(self, speed: float, thrust: float) -> FilmSeries:
         """Series over the film temperature at a speed (rad/s) and thrust (N).
@@ -255,7 +291,36 @@ def thrusts_between(spec: MachineSpec, low: float, high: float) -> tuple[float, 
     return tuple(sorted(found))
 
 
-def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence[float]) -> FrictionMap:
+def solve_friction(spec: MachineSpec, speeds: Array, thrusts: Array) -> FrictionStates:
+    """Every state of a map; raises as :func:`tabulate_friction` does."""
+    mechanics = BearingMechanics(spec)
+    factors = np.array([group.heat_factor.value for group, _ in spec.bearings])
+    kelvin = chebyshev_nodes(*FILM_TEMPERATURES, TEMPERATURE_POINTS)
+    refused: dict[State, SpindleFemError] = {}
+    turning = np.empty((len(speeds), len(thrusts), len(factors), 3, len(kelvin)))
+    for row, speed in enumerate(speeds.tolist()):
+        for column, thrust in enumerate(thrusts.tolist()):
+            turning[row, column], errors = _states(mechanics, _point(spec, speed, thrust), kelvin)
+            refused |= {(row, column, film): error for film, error in errors.items()}
+    turning[:, :, :, MOMENT] -= np.log(factors)[:, None, None]
+    for column in range(len(thrusts)):
+        if np.isnan(turning[:, column]).all():
+            raise refused[0, column, 0]
+    at_rest = []
+    for thrust in thrusts.tolist():
+        still, errors = _states(mechanics, _point(spec, 0.0, thrust), kelvin)
+        for error in errors.values():
+            raise error
+        at_rest.append(still)
+    return FrictionStates(speeds, thrusts, turning, np.array(at_rest), refused)
+
+
+def tabulate_friction(
+    spec: MachineSpec,
+    highest_speed: float,
+    thrusts: Sequence[float],
+    solve: Callable[[MachineSpec, Array, Array], FrictionStates] = solve_friction,
+) -> FrictionMap:
     """Solve a machine's bearings, at the size of assembly, over speed, thrust and film temperature.
 
     Parameters
@@ -266,6 +331,8 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
     highest_speed : float, [rad/s]
     thrusts : sequence of float, [N]
         That occur; a cubic spline between them (a parabola through three).
+    solve : callable
+        As :func:`solve_friction`.
 
     States without an equilibrium are left to :meth:`FrictionMap.require_solved`: a machine may never have
     them, or not at the size of assembly.
@@ -286,32 +353,8 @@ def tabulate_friction(spec: MachineSpec, highest_speed: float, thrusts: Sequence
             "Switch it off here (--set heat.thermal_preload=false), give the heat by table "
             "(--set heat.model=table, with a [heat.table]), or use spindle-fem simulate or transient.",
         )
-    mechanics = BearingMechanics(spec)
-    names = tuple(bearing.name for _, bearing in spec.bearings)
-    factors = np.array([group.heat_factor.value for group, _ in spec.bearings])
     speeds = highest_speed * np.array(SPEED_SHARES)
-    loads = np.unique(np.asarray(thrusts, dtype=float))
-    kelvin = chebyshev_nodes(*FILM_TEMPERATURES, TEMPERATURE_POINTS)
-    refused: dict[State, SpindleFemError] = {}
-    values = np.empty((len(speeds), len(loads), len(names), 3, len(kelvin)))
-    for row, speed in enumerate(speeds.tolist()):
-        for column, thrust in enumerate(loads.tolist()):
-            values[row, column], errors = _states(mechanics, _point(spec, speed, thrust), kelvin)
-            refused |= {(row, column, film): error for film, error in errors.items()}
-    values[:, :, :, MOMENT] -= np.log(factors)[:, None, None]
-    for column in range(len(loads)):
-        if np.isnan(values[:, column]).all(axis=(1, 2, 3)).all():
-            raise refused[0, column, 0]
-    at_rest = []
-    for thrust in loads.tolist():
-        still, errors = _states(mechanics, _point(spec, 0.0, thrust), kelvin)
-        for error in errors.values():
-            raise error
-        at_rest.append(still)
-    turning = FilmSeries.through(kelvin, _continued(values, np.log(speeds)), *FILM_TEMPERATURES).coefficients
-    standing = FilmSeries.through(kelvin, np.array(at_rest), *FILM_TEMPERATURES).coefficients
-    shares = CubicSpline(loads, np.eye(len(loads))) if len(loads) > 1 else None
-    return FrictionMap(names, speeds, loads, CubicSpline(np.log(speeds), turning), standing, shares, refused)
+    return FrictionMap.through(spec, solve(spec, speeds, np.unique(np.asarray(thrusts, dtype=float))))
 
 
 def _states(

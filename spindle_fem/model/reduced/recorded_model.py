@@ -13,6 +13,7 @@ from spindle_fem.model.reduced.fast_model import FastModel
 from spindle_fem.model.reduced.film_heat import FilmHeat, film_heat_of, operators_machine, tabulated_machine
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.operation.friction_map import needs_map, tabulate_friction, thrusts_between
+from spindle_fem.operation.kept_friction import kept_friction
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.input_limits import require_possible_inputs
 
@@ -50,7 +51,7 @@ def fast_model_for(
         return fast_spindle(model, spec)
     progress("friction over speed, thrust and film temperature")
     thrusts = thrusts_between(spec, *_recorded_range(recordings, "thrust", spec.operation.thrust))
-    friction = tabulate_friction(spec, options.highest_speed_of(spec), thrusts)
+    friction = tabulate_friction(spec, options.highest_speed_of(spec), thrusts, kept_friction)
     table = tabulated_machine(spec, friction)
     term = FilmHeat(friction, spec, table)
     made_of = operators_machine(table, term)
