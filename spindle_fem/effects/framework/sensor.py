@@ -21,8 +21,9 @@ Form = tuple[tuple[TermParameter, ...], float, Sequence[Mapping[str, float]]]
 # A sensor that shows less than this share of a change says nothing of the temperature at its place.
 LEAST_SHOWN = 0.1
 # Sizes of a delay from which searches begin beside its reference, each so many times the one before: readings
-# follow one that is longer than a change of load takes to nothing like first order.
-DELAY_RATIO = 4.0
+# follow one that is longer than a change of load takes to nothing like first order. None is farther off than
+# this many standard deviations: an hour, as of another time zone, is nine.
+DELAY_RATIO, FARTHEST_DELAY = 4.0, 10.0
 
 
 def as_felt(
@@ -108,8 +109,7 @@ class SensorEffect(Effect):
         if not self.delays:
             return candidate.starts
         item = candidate.parameters[candidate.amplitude]
-        longest = max(abs(item.low), item.high)
-        number = 1 + int(np.log(longest / candidate.reference) / np.log(DELAY_RATIO))
-        sizes = candidate.reference * DELAY_RATIO ** np.arange(number)
-        further = [size for size in (*sizes[1:], *-sizes) if item.low <= size <= item.high]
+        least, longest = abs(candidate.reference), min(item.high, FARTHEST_DELAY * item.sigma)
+        sizes = least * DELAY_RATIO ** np.arange(1 + int(np.log(longest / least) / np.log(DELAY_RATIO)))
+        further = [size for size in (*sizes[1:], *-sizes) if size >= item.low]
         return (*candidate.starts, *({candidate.amplitude: float(size)} for size in further))
