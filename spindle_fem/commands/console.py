@@ -364,12 +364,14 @@ def _best_designs(content: dict[str, Any]) -> list[str]:
             f"{path} = {scale.text(value)} {scale.unit}".rstrip() for path, scale, value in shown
         )
 
-    alike = ", ".join(map(str, optimum["within_mesh_error"])) or "none"
-    return [
+    lines = [
         f"best ({wanted}): design {best['design']}, {listed(best['parameters'])}",
         f"  there {listed(best['outputs'])}",
-        f"  as good within the mesh's error: {alike}",
     ]
+    # Folders of earlier versions lack the key.
+    if alike := optimum.get("within_mesh_error"):
+        lines.append(f"  as good within the mesh's error: {', '.join(map(str, alike))}")
+    return lines
 
 
 def print_transient(content: dict[str, Any], folder: Path) -> None:
