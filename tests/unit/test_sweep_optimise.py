@@ -56,7 +56,7 @@ def test_search_improves_on_the_plan_and_nears_the_optimum():
     chosen = study(45)
     planned, tried = run(chosen)
     assert [row["design"] for row in tried] == list(range(9, 54))
-    ranking = rank(chosen, [*planned, *tried])
+    ranking = rank(chosen, [*planned, *tried], 0.0)
     best = ranking.rows[ranking.front[0]]
     assert best["design"] > 8
     assert best["t_degC"] < 0.05
