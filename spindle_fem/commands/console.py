@@ -336,9 +336,9 @@ def print_sweep(content: dict[str, Any], folder: Path) -> None:
     for key, value in content.items():
         if isinstance(value, (str, int, float)) and key != "schema":
             console.print(f"{key.replace('_', ' ')}: {value}")
-    files = f"Table: {folder / 'results.csv'}; report: {folder / 'report.html'}"
-    for line in (*_best_designs(content), files):
+    for line in _best_designs(content):
         console.print(line)
+    console.print(f"Table: {folder / 'results.csv'}; report: {folder / 'report.html'}")
 
 
 def _best_designs(content: dict[str, Any]) -> list[str]:
@@ -364,14 +364,13 @@ def _best_designs(content: dict[str, Any]) -> list[str]:
             f"{path} = {scale.text(value)} {scale.unit}".rstrip() for path, scale, value in shown
         )
 
-    lines = [
+    # Folders of earlier versions lack the key.
+    alike = ", ".join(map(str, optimum.get("within_mesh_error", ())))
+    return [
         f"best ({wanted}): design {best['design']}, {listed(best['parameters'])}",
         f"  there {listed(best['outputs'])}",
+        *([f"  as good within the mesh's error: {alike}"] if alike else ()),
     ]
-    # Folders of earlier versions lack the key.
-    if alike := optimum.get("within_mesh_error"):
-        lines.append(f"  as good within the mesh's error: {', '.join(map(str, alike))}")
-    return lines
 
 
 def print_transient(content: dict[str, Any], folder: Path) -> None:

@@ -42,7 +42,7 @@ def solved(designs):
         depth, inlet, hand = (design.values[axis.path] for axis in AXES)
         t = ((depth - 0.019) / 0.01) ** 2 + ((inlet - 31.0) / 15.0) ** 2 + (0.5 if hand == "right" else 0.0)
         row = {"design": design.number, **design.values, "t_degC": t, "drop_Pa": 0.012 / depth}
-        row |= {"status": "failed" if depth > 0.029 else "ok", "reason": ""}
+        row |= {"status": "failed" if depth > 0.029 else "ok", "reason": "", "geometry": f"{depth}"}
         rows.append(row | judged(row, LIMITS))
     return rows
 
