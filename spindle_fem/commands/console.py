@@ -364,8 +364,7 @@ def _best_designs(content: dict[str, Any]) -> list[str]:
             f"{path} = {scale.text(value)} {scale.unit}".rstrip() for path, scale, value in shown
         )
 
-    # Folders of earlier versions lack the key.
-    alike = ", ".join(map(str, optimum.get("within_mesh_error", ())))
+    alike = ", ".join(map(str, optimum.get("within_mesh_error", ())))  # folders of earlier versions lack it
     return [
         f"best ({wanted}): design {best['design']}, {listed(best['parameters'])}",
         f"  there {listed(best['outputs'])}",
