@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+from threadpoolctl import threadpool_limits
 
 from spindle_fem.commands.diagnose_command import diagnose_without_report
 from spindle_fem.commands.simulate_command import simulate_machine
@@ -373,6 +374,8 @@ def test_fits_abreast_are_those_of_one_process(machine, tmp_path):
     assert len({round(fit.log_evidence, 3) for fit in alone}) == len(orders)
 
 
+# As in a diagnosis: several threads of BLAS sum in an order that depends on the process.
+@threadpool_limits.wrap(limits=1)
 def test_screening_is_that_of_one_process(machine, tmp_path):
     folder = record(tmp_path / "r", 5, extra=hot)
     opened = open_machine(machine, (), [read_recording(folder)], [])
