@@ -191,6 +191,8 @@ def _diagnose(request: _Request, reporter: BackgroundProcess | None) -> dict[str
             made = improved()
             replace_text(place / "improved_machine.toml", made.text)
             content["fit"]["improved_machine"] = dict(made.errors)
+            for what in made.lacks:
+                LOGGER.warning("improved_machine.toml lacks %s", what)
             if reporter is not None:
                 drawn()
         content["wall_time_s"] = time.perf_counter() - started

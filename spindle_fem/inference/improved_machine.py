@@ -34,7 +34,6 @@ from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import slow_error_of
 from spindle_fem.model.lumped.written_network import value_in_definition
-from spindle_fem.results.run_log import LOGGER
 from spindle_fem.units import Uncertain
 
 
@@ -60,17 +59,17 @@ def _as_defined(belief: Belief, kept: list[int]) -> Belief:
     )
 
 
-def _as_written(diagnosis: Diagnosis, machine: DiagnosedMachine) -> tuple[Predictor, Fit]:
-    """The chosen set on the machine as its definition can be written, fitted once more.
+def _as_written(diagnosis: Diagnosis, machine: DiagnosedMachine) -> tuple[Predictor, Fit, list[str]]:
+    """The chosen set on the machine as its definition can be written, fitted once more, and what that lacks.
 
     Of a network that is without directions of misdescription. Of a machine with geometry those remain that
     have a key to be corrected, or that belong to a recording or a sensor; lengths, films along the channel
     and places of probes are as defined, and the parameters take what they can of them. Where that cannot be
-    simulated the fit stands as it is, which the log says.
+    simulated the fit stands as it is.
     """
     predictor, fit = diagnosis.predictor, diagnosis.stated_fit
     if not predictor.misdescribed:
-        return predictor, fit
+        return predictor, fit, []
     directions: tuple[Misdescription, ...] = ()
     if not machine.is_network:
         directions = tuple(d for d in predictor.misdescribed if _has_its_place(d, machine.spec))
@@ -90,9 +89,12 @@ def _as_written(diagnosis: Diagnosis, machine: DiagnosedMachine) -> tuple[Predic
             fit = problem.fit(fit.candidates, fit.values)
             slow = slow_error_of(problem, fit)
     except NOT_SIMULATED as error:
-        LOGGER.warning("improved_machine.toml lacks what its definition cannot hold of the fit: %s", error)
-        return diagnosis.predictor, diagnosis.stated_fit
-    return predictor, fit
+        return (
+            diagnosis.predictor,
+            diagnosis.stated_fit,
+            [f"what its definition cannot hold of the fit: {error}"],
+        )
+    return predictor, fit, []
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,10 +108,13 @@ class ImprovedMachine:
     errors : mapping of str to float, [K]
         ``train_rmse_K`` and ``heldout_rmse_K`` of what it holds, without what is of a recording or a sensor
         alone; empty where it lacks something that was found.
+    lacks : tuple of str
+        What it does not hold, in words.
     """
 
     text: str
     errors: Mapping[str, float]
+    lacks: tuple[str, ...]
 
 
 def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> ImprovedMachine:
@@ -118,18 +123,17 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> Improve
     Parameters keep their remaining uncertainty. Directions of misdescription that correspond to a key of the
     definition are corrected; what no key corresponds to, and the position of a probe in its hole, is left as
     defined, and the parameters are fitted once more without it. A finding that belongs to one of several
-    recordings, whose intervals count from its first row, is left out, which the log says.
+    recordings, whose intervals count from its first row, is left out.
     """
-    predictor, fit = _as_written(diagnosis, machine)
+    predictor, fit, lacks = _as_written(diagnosis, machine)
     values = fit.values
     told = {name: state.candidate for name, state in diagnosis.states.items()}
     candidates = [told.get(item.amplitude, item) for item in fit.candidates]
     # An entry of a definition acts in whatever is simulated.
     several = len(predictor.recordings) > 1
     left_out = [item for item in candidates if several and item.recording is not None]
-    for item in left_out:
-        name = predictor.recordings[item.recording].name
-        LOGGER.warning("improved_machine.toml lacks %s, which acts in %s only", item.label, name)
+    runs = predictor.recordings
+    lacks += [f"{item.label}, which acts in {runs[item.recording].name} only" for item in left_out]
     candidates = [item for item in candidates if not several or item.recording is None]
     errors = {} if left_out else _errors(predictor, fit)
     entries = tuple(
@@ -147,7 +151,7 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> Improve
             if hasattr(item.change, "corrected"):
                 spec = item.change.corrected(spec, values[item.coordinate])
         spec = spec.model_copy(update={"effects": (*machine.spec.effects, *entries)})
-        return ImprovedMachine(write_machine(spec), errors)
+        return ImprovedMachine(write_machine(spec), errors, tuple(lacks))
     moved = {}
     for name, (factor, _) in own.items():
         index = next(i for i, c in enumerate(fit.coordinates) if c.name == name)
@@ -155,7 +159,7 @@ def improved_machine(diagnosis: Diagnosis, machine: DiagnosedMachine) -> Improve
         moved[name] = Uncertain(value_in_definition(machine.spec, machine.fast.network, name, factor), sigma)
     spec = network_spec.with_parameters(machine.spec, moved)
     spec = spec.model_copy(update={"effects": (*machine.spec.effects, *entries)})
-    return ImprovedMachine(network_spec.write_network_machine(spec), errors)
+    return ImprovedMachine(network_spec.write_network_machine(spec), errors, tuple(lacks))
 
 
 def _errors(predictor: Predictor, fit: Fit) -> dict[str, float]:

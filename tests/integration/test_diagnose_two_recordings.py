@@ -21,8 +21,7 @@ def test_heat_at_one_node_at_other_times_in_each_recording_is_two_findings(tmp_p
     for seed, (name, on) in enumerate(ON.items(), 7):
         heat = lambda time, on=on: HEAT if on[0] <= time < on[1] else 0.0  # noqa: E731
         runs.append(record(tmp_path / name, seed, built=built, times=TIMES, extra=heat))
-    # A quiet command before may have left the level of the package higher.
-    caplog.set_level(logging.WARNING, logger="spindle_fem")
+    caplog.set_level(logging.WARNING)
     content = diagnose_without_report(machine, runs, tmp_path / "out")
     assert content["verdict"] == "missing_physics"
     findings = {item["recording"]: item for item in content["findings"]}

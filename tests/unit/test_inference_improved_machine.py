@@ -166,7 +166,7 @@ def test_a_size_whose_place_is_unsure_has_a_wider_interval(found, monkeypatch):
     assert shifted["high"] - shifted["low"] == pytest.approx(2.0 * 1.645 * size, rel=0.2)
 
 
-def test_heat_of_one_of_two_recordings_is_not_written_for_both(opened, tmp_path, caplog):
+def test_heat_of_one_of_two_recordings_is_not_written_for_both(opened, tmp_path):
     heat = replace(candidate_of(opened, "unrecorded_heat_source"), recording=1)
     both = Predictor(opened.fast, [opened.recordings[0]] * 2)
     own = {heat.amplitude: heat.reference}
@@ -188,7 +188,7 @@ def test_heat_of_one_of_two_recordings_is_not_written_for_both(opened, tmp_path,
     made = improved_machine(outcome, opened)
     path.write_text(made.text)
     assert made.errors == {}
-    assert "lacks unrecorded_heat_source @ body, which acts in hot only" in caplog.text
+    assert made.lacks == ("unrecorded_heat_source @ body, which acts in hot only",)
     again = open_machine(path, (), recordings, ())
     told = predictions_at_stamps(
         predictor_of(again, recordings[0]), SimpleNamespace(values={}, candidates=())
