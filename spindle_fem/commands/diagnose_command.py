@@ -31,6 +31,7 @@ from spindle_fem.inference.heldout import heldout_stamps
 from spindle_fem.inference.improved_machine import improved_machine
 from spindle_fem.inference.next_measurement import next_measurement
 from spindle_fem.inference.opened_machine import DiagnosedMachine, open_machine, with_growth
+from spindle_fem.inference.redefined_machine import with_definition_put_right
 from spindle_fem.inference.sufficiency import says_too_little
 from spindle_fem.inference.worker_processes import Workers
 from spindle_fem.parallel import BackgroundProcess, keep_freed_memory, thread_count
@@ -160,15 +161,20 @@ def _diagnose(request: _Request, reporter: BackgroundProcess | None) -> dict[str
         else:
             workers = Workers(min(thread_count(), MOST_WORKERS))
             workers.wake()
-            begun = BegunRuns(opened, request.full_model)
-            diagnosis = diagnose_recordings(
-                opened,
-                heldout=request.heldout,
-                progress=tell,
-                workers=workers,
-                settled=begun.begin,
-                meanwhile=begun.prepare,
-            )
+            begun: list[BegunRuns] = []
+
+            def diagnosed(machine: DiagnosedMachine) -> Diagnosis:
+                begun.append(BegunRuns(machine, request.full_model))
+                return diagnose_recordings(
+                    machine,
+                    heldout=request.heldout,
+                    progress=tell,
+                    workers=workers,
+                    settled=begun[-1].begin,
+                    meanwhile=begun[-1].prepare,
+                )
+
+            opened, diagnosis = with_definition_put_right(opened, diagnosed(opened), diagnosed, tell)
             tell("writing")
             replace_text(place / "machine.toml", definition)
             improved = workers.ahead(partial(improved_machine, diagnosis, opened))

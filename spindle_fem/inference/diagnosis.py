@@ -39,11 +39,18 @@ from spindle_fem.inference.prepared_problem import (
 from spindle_fem.inference.recording_clocks import on_clock_of_inputs
 from spindle_fem.inference.search_basis import acted_on, on_smaller_bases, smaller_predictors
 from spindle_fem.inference.search_course import run_search
-from spindle_fem.inference.set_odds import rank
+from spindle_fem.inference.set_odds import best_gain, rank
 from spindle_fem.inference.set_problems import SetProblems, combination_of
 from spindle_fem.inference.verdict import Judgement, judge
 from spindle_fem.inference.worker_processes import Workers
-from spindle_fem.inference.wrong_definition import WrongDirection, with_wrong_definition, wrong_direction
+from spindle_fem.inference.wrong_definition import (
+    Redefined,
+    WrongDirection,
+    definition_is_wrong,
+    open_directions,
+    with_wrong_definition,
+    wrong_direction,
+)
 from spindle_fem.parallel import thread_count
 
 Array = NDArray[np.float64]
@@ -67,7 +74,7 @@ class Diagnosis:
     hypotheses : tuple of Hypothesis
         The most probable first.
     null : Fit
-        Nothing missing, the machine's own parameters fitted.
+        Nothing missing, the machine's own parameters fitted; where its definition is wrong, as it was given.
     final : Fit
         The chosen set.
     explanations : tuple of Explanation
@@ -164,10 +171,12 @@ def diagnose_recordings(
     earlier = None
     if calibration:
         earlier = Predictor(fast, calibration, effects=machine.effects).with_unseen(unseen)
-    directions = misdescriptions_of(predictor)
+    directions = open_directions(misdescriptions_of(predictor), machine.redefined)
     candidates = candidates_for(view, len(recordings))
     places = sorted(acted_on(predictor, view, candidates))
-    calibrating = workers.ahead(partial(_calibrated, earlier, predictor, directions, places))
+    calibrating = workers.ahead(
+        partial(_calibrated, earlier, predictor, directions, places, machine.redefined)
+    )
     small, predictor, known = smaller_predictors(predictor, view, candidates)
     predictor = with_misdescriptions(predictor, directions)
     small = small.misdescribed_like(predictor)
@@ -198,8 +207,10 @@ def diagnose_recordings(
     slow = slow_error_of(problem, best.fit)
     trials = len({(c.effect, c.component) for c in candidates})
     empty = next(h for h in found if not h.fit.candidates)
-    wrong = wrong_direction(problem, empty.fit, directions, trials, coarseness)
-    if wrong is not None and wrong.log_gain > max(0.0, best.score - empty.score):
+    wrong = None
+    if machine.redefined is None:
+        wrong = wrong_direction(problem, empty.fit, directions, trials, coarseness)
+    if wrong is not None and wrong.log_gain > best_gain(found, coarseness):
         belief = wrong.belief
         problem = Problem(small, belief, slow, small.observations)
         slow = slow_error_of(problem, problem.fit((), empty.fit.values))
@@ -254,13 +265,19 @@ def diagnose_recordings(
         beyond=readings.beyond,
         coarseness=coarseness,
     )
-    null, told = next(h for h in refitted if not h.fit.candidates), 0.0
-    if wrong is not None and null.heldout is not None:
-        within = Problem(problems.plain.predictor, calibrated.known, slow, predictor.observations).fit(
-            (), null.fit.values
-        )
-        told = 0.5 * (readings.heldout_misfit(within) - null.heldout) / (coarseness * tuned.GAIN_DIVISOR)
-    judgement = with_wrong_definition(judgement, null.fit, wrong, told)
+    null = next(h for h in refitted if not h.fit.candidates)
+    if machine.redefined is not None:
+        wrong = machine.redefined.wrong
+    elif wrong is not None:
+        as_known = Problem(problems.plain.predictor, calibrated.known, slow, predictor.observations)
+        wrong = replace(wrong, within=as_known.fit((), null.fit.values))
+        if null.heldout is not None:
+            gain = 0.5 * (readings.heldout_misfit(wrong.within) - null.heldout)
+            wrong = replace(wrong, told=gain / (coarseness * tuned.GAIN_DIVISOR))
+    judgement = with_wrong_definition(judgement, null.fit, wrong, machine)
+    before = null.fit
+    if wrong is not None and wrong.within is not None and definition_is_wrong(judgement):
+        before = wrong.within
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit
     about_chosen = problems.of(chosen_fit)
@@ -288,7 +305,7 @@ def diagnose_recordings(
         calibrated,
         tuple(refitted),
         judgement,
-        null.fit,
+        before,
         judgement.chosen.fit,
         tuple(explanations),
         chosen[0][1],
@@ -310,13 +327,14 @@ def _calibrated(
     predictor: Predictor,
     directions: Sequence[Misdescription],
     places: Sequence[str],
+    redefined: Redefined | None,
 ) -> Calibrated:
     """What is known of a machine on the recordings to be diagnosed, from those of its calibration if any.
 
     ``places`` are those where something may act: what is not exact of the machine acts there too.
     """
     if earlier is not None:
-        found = misdescriptions_of(earlier)
+        found = open_directions(misdescriptions_of(earlier), redefined)
         if not earlier.is_network:
             _, earlier = on_smaller_bases(earlier, [prior.name for prior in earlier.uncertain()], places)
         earlier = with_misdescriptions(earlier, found)

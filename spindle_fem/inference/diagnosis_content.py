@@ -87,7 +87,7 @@ def diagnosis_content(
         },
         "improved_model": "improved_machine.toml",
         "machine_parameters": _machine_parameters(diagnosis),
-        "misdescription": misdescription_content(diagnosis),
+        "misdescription": misdescription_content(diagnosis, opened),
         "slow_error": {"sigma_K": diagnosis.final.slow.sigma, "time_s": diagnosis.final.slow.time},
         "candidates_tried": diagnosis.candidates_tried,
         "hypotheses_fitted": len(diagnosis.hypotheses),

@@ -111,16 +111,16 @@ class BegunRuns:
     """
 
     def __init__(self, machine: DiagnosedMachine, mesh: str = AUTO) -> None:
-        self._machine, self._mesh = machine, mesh
+        self.machine, self._mesh = machine, mesh
         self._needed = mesh in (AUTO, COARSE) and not machine.is_network and thread_count() > 1
-        self._prepared: PreparedMachine | None = None
+        self._prepared: dict[str, PreparedMachine] = {}
         self.fits: list[BegunFit] = []
 
     def prepare(self) -> None:
         """Mesh the machine, if it will be needed: all runs share it."""
-        if self._needed and self._prepared is None:
+        if self._needed:
             try:
-                self._prepared = prepare_machine(spec_on(self._machine.spec, COARSE))
+                self.machine_on(COARSE)
             except SpindleFemError:
                 # Who asks for the errors is told why.
                 self._needed = False
@@ -131,15 +131,16 @@ class BegunRuns:
         if not self._needed or (self._mesh == AUTO and expected_steps(predictor, options) > MOST_STEPS):
             return
         self.prepare()
-        if self._prepared is not None:
-            runs = start_copy(partial(alone, mesh_runs, self._prepared, predictor, fit, options))
+        if self._needed:
+            prepared = self.machine_on(COARSE)
+            runs = start_copy(partial(alone, mesh_runs, prepared, predictor, fit, options))
             self.fits.append(BegunFit(fit, options, runs))
 
     def machine_on(self, mesh: str) -> PreparedMachine:
-        """The machine on the coarse mesh or its own."""
-        if mesh == COARSE and self._prepared is not None:
-            return self._prepared
-        return prepare_machine(spec_on(self._machine.spec, mesh))
+        """The machine on the coarse mesh or its own, made once."""
+        if mesh not in self._prepared:
+            self._prepared[mesh] = prepare_machine(spec_on(self.machine.spec, mesh))
+        return self._prepared[mesh]
 
 
 def require_choice(choice: str) -> str:
@@ -168,7 +169,7 @@ def full_model_errors(
     *,
     mesh: str = AUTO,
     options: TransientOptions | None = None,
-    begun: BegunRuns | None = None,
+    begun: Sequence[BegunRuns] = (),
     keep: Keep = lambda name, predicted: None,
     progress: Progress = lambda stage: None,
 ) -> dict[str, Any]:
@@ -184,8 +185,9 @@ def full_model_errors(
         the recordings need very many time steps.
     options : TransientOptions, optional
         How accurately time is followed; :func:`options_for` when absent.
-    begun : BegunRuns, optional
-        Which serve where a fit is the same.
+    begun : sequence of BegunRuns
+        Which serve where a fit is the same: of the machine as its definition was given first, which is
+        ``machine`` unless that was put right.
     keep : callable
         Gets ``before`` or ``after`` and its predictions.
 
@@ -214,7 +216,8 @@ def full_model_errors(
         return nothing_run(OFF if mesh == AUTO else mesh, NETWORK_REASON)
     predictor = diagnosis.predictor
     options = options_for(predictor) if options is None else options
-    begun = BegunRuns(machine, OFF) if begun is None else begun
+    begun = begun or (BegunRuns(machine, OFF),)
+    own = next(item for item in begun if item.machine is machine)
     if mesh == AUTO:
         steps = expected_steps(predictor, options)
         if steps > MOST_STEPS:
@@ -223,7 +226,9 @@ def full_model_errors(
             )
         mesh = COARSE
     try:
-        return balanced(lambda asked: _both_fits(diagnosis, mesh, asked, begun, keep, progress), options)
+        return balanced(
+            lambda asked: _both_fits(diagnosis, mesh, asked, (begun[0], own), keep, progress), options
+        )
     except SpindleFemError as error:
         return nothing_run(mesh, f"It could not be run: {error}")
 
@@ -266,17 +271,17 @@ def _both_fits(
     diagnosis: Diagnosis,
     mesh: str,
     options: TransientOptions,
-    begun: BegunRuns,
+    begun: tuple[BegunRuns, BegunRuns],
     keep: Keep,
     progress: Progress,
 ) -> dict[str, Any]:
     progress("full model: mesh")
-    prepared = begun.machine_on(mesh)
+    prepared = begun[1].machine_on(mesh)
     before, after = (diagnosis.unchanged, diagnosis.null), (diagnosis.predictor, diagnosis.stated_fit)
     fits = {"before": before, "after": after}
-    same = _is_same(diagnosis.null, diagnosis.stated_fit)
+    same = begun[0] is begun[1] and _is_same(diagnosis.null, diagnosis.stated_fit)
     different = {"before, which is after": before} if same else fits
-    runs = _runs(prepared, different, options, mesh, begun.fits, progress)
+    runs = _runs(different, dict(zip(different, begun, strict=False)), options, mesh, progress)
     if same:
         (run,) = runs.values()
         runs = dict.fromkeys(fits, run)
@@ -323,24 +328,28 @@ def spec_on(spec: MachineSpec, mesh: str) -> MachineSpec:
 
 # -------------------------------------------------------------------- details
 def _runs(
-    machine: PreparedMachine,
     fits: Mapping[str, tuple[Predictor, Fit]],
+    begun: Mapping[str, BegunRuns],
     options: TransientOptions,
     mesh: str,
-    begun: Sequence[BegunFit],
     progress: Progress,
 ) -> dict[str, FullFit]:
     """Every fit run once: those that were begun waited for, others on the coarse mesh side by side.
 
-    In this process, with a warning, where another one ends prematurely.
+    Each on the machine of its own begun runs; in this process, with a warning, where another one ends
+    prematurely.
     """
     served = {
-        name: item for name, (_, fit) in fits.items() for item in begun if item.serves(fit, mesh, options)
+        name: item
+        for name, (_, fit) in fits.items()
+        for item in begun[name].fits
+        if item.serves(fit, mesh, options)
     }
+    machines = {name: begun[name].machine_on(mesh) for name in fits}
     jobs = {
-        name: partial(alone, run_fit, machine, *fit, options)
+        name: partial(alone, run_fit, machines[name], *fit, options)
         if mesh == COARSE
-        else partial(run_fit, machine, *fit, options)
+        else partial(run_fit, machines[name], *fit, options)
         for name, fit in fits.items()
     }
     if mesh != COARSE or thread_count() == 1:

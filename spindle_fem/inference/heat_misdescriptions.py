@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.effect import Reported
 from spindle_fem.effects.framework.filters import delayed, first_order_lag
 from spindle_fem.inference import tuned
 from spindle_fem.inference.candidate_response import BaseRun
@@ -99,7 +100,22 @@ class Conductivity:
     def corrected(self, spec: MachineSpec, value: float) -> MachineSpec:
         """The machine with the conductivity that it has."""
         own = spec.materials[self.material]
-        changed = own.model_copy(update={"thermal_conductivity": own.thermal_conductivity * (1.0 + value)})
+        return self._with(spec, own.thermal_conductivity * (1.0 + value))
+
+    def quantity(self, spec: MachineSpec) -> Reported:
+        """Its conductivity."""
+        return Reported(spec.materials[self.material].thermal_conductivity, "W/(m·K)")
+
+    def redefined(self, spec: MachineSpec, value: float) -> MachineSpec:
+        """The machine with another conductivity.
+
+        To first order a share adds conductance where paths are in parallel and takes resistance where they
+        are in series; the exponential lies between.
+        """
+        return self._with(spec, spec.materials[self.material].thermal_conductivity * float(np.exp(value)))
+
+    def _with(self, spec: MachineSpec, conductivity: float) -> MachineSpec:
+        changed = spec.materials[self.material].model_copy(update={"thermal_conductivity": conductivity})
         return spec.model_copy(update={"materials": {**spec.materials, self.material: changed}})
 
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.effect import Reported
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_IN_PREFIX, MISDESCRIBED_PREFIX
 
 Array = NDArray[np.float64]
@@ -40,6 +42,17 @@ class Change:
     direct: Array | None = None
 
 
+@runtime_checkable
+class Redefinable(Protocol):
+    """What changes a number of the definition, by far as well, so that the machine can be made anew."""
+
+    def quantity(self, spec: MachineSpec) -> Reported | None:
+        """The number as the definition has it; None where no single key does."""
+
+    def redefined(self, spec: MachineSpec, value: float) -> MachineSpec:
+        """The machine with that number changed by what a fit to first order found."""
+
+
 @dataclass(frozen=True, slots=True)
 class Misdescription:
     """One direction of misdescription.
@@ -58,7 +71,8 @@ class Misdescription:
     change : callable
         Takes the :class:`spindle_fem.inference.candidate_response.BaseRun` of a recording. A function of a
         module or a frozen dataclass, as other processes get it too.
-        May have a method ``corrected(spec, value)``: the machine with the definition put right.
+        May have a method ``corrected(spec, value)``: the machine with the definition put right; and, where it
+        is a number of the definition whose far values are another machine, be :class:`Redefinable`.
     recording : int or None
         The only recording that it concerns; None for the machine itself.
     of_sensor : bool

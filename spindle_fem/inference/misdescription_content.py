@@ -9,15 +9,22 @@ import numpy as np
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.misdescription import EVERY_CHANNEL, Misdescription
+from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.wrong_definition import defined_number, definition_is_wrong, departure
 from spindle_fem.units import NORMAL_90_PERCENT
 
 # Directions that are listed: those moved by this many standard deviations of their priors, so many at most.
 MOVED, MOST_LISTED = 0.7, 8
 
 
-def misdescription_content(diagnosis: Diagnosis) -> dict[str, Any]:
+def misdescription_content(diagnosis: Diagnosis, machine: DiagnosedMachine) -> dict[str, Any]:
     """Directions most moved, with what was found and with nothing missing; which one to measure.
+
+    Parameters
+    ----------
+    machine : DiagnosedMachine
+        The same.
 
     Returns
     -------
@@ -25,25 +32,46 @@ def misdescription_content(diagnosis: Diagnosis) -> dict[str, Any]:
         ``directions`` (how many were open), ``left_open`` (rows of the chosen set's fit), ``instead`` (rows
         of the fit with nothing missing: what would have to hold if nothing of the found were there; empty
         when nothing was found), ``measure`` (the direction that is worth measuring most, and why; None where
-        none moves), ``wrong`` (the row of a definition that is wrong; None else).
+        none moves), ``wrong`` (the row of a definition that is wrong, with ``defined`` where a number of the
+        definition is: ``given``, ``value``, ``low``, ``high`` and ``unit``; None else).
     """
     final, null = (diagnosis.predictor, diagnosis.stated_fit), (diagnosis.unchanged, diagnosis.null)
     found = bool(diagnosis.final.candidates)
-    wrong = diagnosis.wrong.direction if diagnosis.judgement.verdict == "parameter" and not found else None
+    wrong = None
+    if definition_is_wrong(diagnosis.judgement) and diagnosis.wrong is not None:
+        wrong = _wrong_row(*final, diagnosis.wrong.direction, machine)
     return {
         "directions": len(diagnosis.predictor.misdescribed),
-        "left_open": _rows(*final),
+        "left_open": _rows(*final, wrong),
         "instead": _rows(*null) if found else [],
-        "measure": _to_measure(*(null if found else final)),
-        "wrong": None if wrong is None else _row(*final, wrong, final[1].stated_sigmas),
+        "measure": _to_measure(*(null if found else final), wrong),
+        "wrong": wrong,
     }
 
 
-def _rows(predictor: Predictor, fit: Fit) -> list[dict[str, Any]]:
-    sigmas = fit.stated_sigmas
-    rows = [_row(predictor, fit, item, sigmas) for item in predictor.misdescribed]
+def _rows(predictor: Predictor, fit: Fit, wrong: dict[str, Any] | None = None) -> list[dict[str, Any]]:
+    sigmas, known = fit.stated_sigmas, {} if wrong is None else {wrong["name"]: wrong}
+    rows = [known.get(item.name) or _row(predictor, fit, item, sigmas) for item in predictor.misdescribed]
     moved = [row for row in rows if abs(row["sigmas"]) >= MOVED]
     return sorted(moved, key=lambda row: -abs(row["sigmas"]))[:MOST_LISTED]
+
+
+def _wrong_row(
+    predictor: Predictor, fit: Fit, item: Misdescription, machine: DiagnosedMachine
+) -> dict[str, Any]:
+    """The row of the direction in which the definition is wrong, about the definition that was given."""
+    row = _row(predictor, fit, item, fit.stated_sigmas)
+    fitted = {key: row[key] for key in ("value", "low", "high")}
+    beyond = {key: departure(item, machine, value) for key, value in fitted.items()}
+    if fitted["value"]:
+        row["largest_K"] *= abs(beyond["value"] / fitted["value"])
+    row |= beyond | {"sigmas": beyond["value"] / item.sigma}
+    before = defined_number(item, machine.given)
+    if before is not None:
+        row["defined"] = {"given": before.value, "unit": before.unit}
+        for key, value in fitted.items():
+            row["defined"][key] = defined_number(item, machine.spec, value).value
+    return row
 
 
 def _row(predictor: Predictor, fit: Fit, item: Misdescription, sigmas: np.ndarray) -> dict[str, Any]:
@@ -87,11 +115,14 @@ def _late_already(predictor: Predictor, item: Misdescription) -> float:
     return float(predictor.late[item.recording]) if item.delays == EVERY_CHANNEL else 0.0
 
 
-def _to_measure(predictor: Predictor, fit: Fit) -> dict[str, Any] | None:
+def _to_measure(predictor: Predictor, fit: Fit, wrong: dict[str, Any] | None = None) -> dict[str, Any] | None:
     """The direction that readings hold farthest off the definition, in widths of its posterior.
 
-    None where none lies more than one width off.
+    That in which the definition is wrong, if it is. None where none lies more than one width off.
     """
+    if wrong is not None:
+        width = (wrong["high"] - wrong["low"]) / (2.0 * NORMAL_90_PERCENT)
+        return _measured(wrong, abs(wrong["value"]) / width)
     names = [c.name for c in fit.coordinates]
     best, most = None, 1.0
     for item in predictor.misdescribed:
@@ -102,6 +133,9 @@ def _to_measure(predictor: Predictor, fit: Fit) -> dict[str, Any] | None:
             best, most = item, float(widths)
     if best is None:
         return None
-    row = _row(predictor, fit, best, fit.stated_sigmas)
-    why = f"the readings hold it {most:.1f} standard deviations off the definition"
-    return {"key": best.key, "name": best.name, "expected": row["value"], "unit": best.unit, "why": why}
+    return _measured(_row(predictor, fit, best, fit.stated_sigmas), most)
+
+
+def _measured(row: dict[str, Any], widths: float) -> dict[str, Any]:
+    why = f"the readings hold it {widths:.1f} standard deviations off the definition"
+    return {"expected": row["value"], "why": why} | {key: row[key] for key in ("key", "name", "unit")}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +11,13 @@ from typing import Any
 import numpy as np
 
 from spindle_fem.definition import network_load as network_spec
-from spindle_fem.definition.load import find_machine, load_machine, read_definition
+from spindle_fem.definition.load import (
+    find_machine,
+    load_machine,
+    read_definition,
+    validate,
+    write_machine,
+)
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.definition.network_tables import NetworkMachineSpec
 from spindle_fem.effects.framework.machine_view import MachineView
@@ -62,6 +69,8 @@ class DiagnosedMachine:
         Of the recordings, then the calibration: :func:`spindle_fem.inference.input_sampling.unseen_power`.
     too_coarse : object or None
         :class:`spindle_fem.inference.coarse_machine.TooCoarse`, where the machine's own calibration says so.
+    redefined : object or None
+        :class:`spindle_fem.inference.wrong_definition.Redefined`, where the definition was put right.
     heldout : str
         What the view was made without, as :func:`spindle_fem.inference.heldout.heldout_stamps` takes it.
     """
@@ -77,7 +86,13 @@ class DiagnosedMachine:
     unseen: tuple[np.ndarray, ...] = ()
     rows: tuple[Recording, ...] = ()
     too_coarse: Any = None
+    redefined: Any = None
     heldout: str = "blocks"
+
+    @property
+    def given(self) -> MachineSpec | NetworkMachineSpec:
+        """The definition before it was put right."""
+        return self.spec if self.redefined is None else self.redefined.given
 
     @property
     def is_network(self) -> bool:
@@ -109,9 +124,21 @@ def open_machine(
     if network_spec.is_network_machine(read_definition(find_machine(machine))):
         return _open_network(machine, overrides, recordings, calibration, heldout)
     given = load_machine(machine, overrides)
-    spec = at_assembly_size(given)
     recordings, notes = _denoised(recordings)
     calibration, more = _denoised(calibration)
+    opened = _with_geometry(given, recordings, calibration, heldout, progress)
+    return replace(opened, notes=(*notes, *more, *opened.notes))
+
+
+def _with_geometry(
+    given: MachineSpec,
+    recordings: Sequence[Recording],
+    calibration: Sequence[Recording],
+    heldout: str,
+    progress: Progress,
+) -> DiagnosedMachine:
+    """A machine with geometry on recordings as they are used."""
+    spec, notes = at_assembly_size(given), ()
     every = (*recordings, *calibration)
     fast = fast_model_for(spec, every, progress=progress)
     for recording in every:
@@ -122,12 +149,12 @@ def open_machine(
         try:
             fast, error = with_followed_preload(given, fast, every, effects, progress=progress)
         except ConvergenceError as failed:
-            notes.append(f"thermal preload is left out, bearings keep the size of assembly: {failed.what}")
+            notes = (f"thermal preload is left out, bearings keep the size of assembly: {failed.what}",)
         else:
             spec, view = given, replace(view, has=view.has | effects_in_definition(given))
-            notes.append(
+            notes = (
                 "preload follows the temperatures, by bearing mechanics at states of the machine as defined "
-                f"along these recordings; between them friction errs by {100.0 * error:.2g} % at most"
+                f"along these recordings; between them friction errs by {100.0 * error:.2g} % at most",
             )
     require_solved_friction(fast, every, effects)
     return DiagnosedMachine(
@@ -138,9 +165,25 @@ def open_machine(
         view,
         tuple(recordings),
         tuple(calibration),
-        (*notes, *more),
+        notes,
         heldout=heldout,
     )
+
+
+def with_definition(
+    machine: DiagnosedMachine, spec: MachineSpec, progress: Progress = lambda stage: None
+) -> DiagnosedMachine:
+    """The recordings with another definition of a machine with geometry, whose fast model is made or fetched.
+
+    Raises
+    ------
+    SpindleFemError
+        A definition that is none, or that cannot be meshed or solved.
+    """
+    given = validate(tomllib.loads(write_machine(spec)), spec.name)
+    opened = _with_geometry(given, machine.recordings, machine.calibration, machine.heldout, progress)
+    notes = tuple(dict.fromkeys((*machine.notes, *opened.notes)))
+    return replace(opened, name=machine.name, view=machine.view, notes=notes)
 
 
 def _open_network(

@@ -74,6 +74,13 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
     return [score + less[len(item.fit.candidates)] for item, score in zip(hypotheses, scores, strict=True)]
 
 
+def best_gain(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> float:
+    """What the best hypothesis gains over nothing missing, as :func:`tempered` counts it; 0 at least."""
+    scores = tempered(hypotheses, coarseness)
+    empty = next(score for score, h in zip(scores, hypotheses, strict=True) if not h.fit.candidates)
+    return max(scores) - empty
+
+
 def any_magnitude(fit: Fit) -> float:
     """Logarithm of the prior density of a fit's amplitudes, even in their logarithm, over the normal one.
 

@@ -9,11 +9,14 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.effect import Reported
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import GAP_PREFIX, JUMP_PREFIX
 from spindle_fem.inference.misdescription import Change, Misdescription
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.fast_model import FastModel, ModelInputs
+from spindle_fem.model.reduced.structural_directions import with_channel
 from spindle_fem.model.reduced.structural_model import StructuralModel, structural_model_of
 
 Array = NDArray[np.float64]
@@ -31,16 +34,34 @@ _models: WeakKeyDictionary[ModelInputs, StructuralModel] = WeakKeyDictionary()
 
 @dataclass(frozen=True, slots=True)
 class StructuralChange:
-    """Change of the readings by some units of a direction."""
+    """Change of the readings by some units of a direction.
+
+    Attributes
+    ----------
+    channel : tuple of (str, float)
+        Keys of the cooling channel that change, and by how much [m] for a unit of the direction.
+    """
 
     name: str
     amount: float = 1.0
+    channel: tuple[tuple[str, float], ...] = ()
 
     def __call__(self, base: BaseRun) -> Change:
         """Derivative of the same run on the model that has the directions."""
         if base not in _known:
             _known[base] = structural_columns(base)
         return Change(direct=self.amount * _known[base][self.name])
+
+    def quantity(self, spec: MachineSpec) -> Reported | None:
+        """The length of the channel that changes, mm."""
+        if len(self.channel) != 1:
+            return None
+        ((key, _),) = self.channel
+        return Reported(1e3 * float(getattr(spec.channel, key)), "mm")
+
+    def redefined(self, spec: MachineSpec, value: float) -> MachineSpec:
+        """The machine with another channel."""
+        return with_channel(spec, {key: value * self.amount * each for key, each in self.channel})
 
 
 def structural_columns(base: BaseRun) -> dict[str, Array]:
@@ -61,9 +82,10 @@ def structural_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]
     """
     if predictor.is_network or not predictor.fast.model.n_full:
         return
-    for item in model_with_directions(predictor.fast).structural:
+    model = model_with_directions(predictor.fast)
+    for item in model.structural:
         unit, scale = TOLD_IN.get(item.unit, (item.unit, 1.0))
-        change = StructuralChange(item.name, scale)
+        change = StructuralChange(item.name, scale, tuple(model.changes[item.name].channel.items()))
         yield Misdescription(item.name, item.key, unit, item.sigma / scale, item.statement, change)
 
 

@@ -8,15 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.special import chdtrc
 
+from spindle_fem.definition.machine_spec import MachineSpec
+from spindle_fem.effects.framework.effect import Reported, quantity
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import THETA_BOUND, Belief
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.linearised_fit import Box, LinearProblem, bounded_minimum
-from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.misdescription import Misdescription, Redefinable
+from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.verdict import PRIOR_SIGMAS, Judgement
 
 # Width of the prior of what is wrong, in standard deviations of the one that is given up.
@@ -35,12 +39,50 @@ class WrongDirection:
         What the data become likelier by, priors and the wider one's complexity included.
     p_value : float
         Probability of so large a gain in any of the directions if the definition were right.
+    told : float
+        What held-out readings become likelier by, as a logarithm that counts.
+    within : Fit or None
+        Nothing missing, that prior kept.
     """
 
     direction: Misdescription
     belief: Belief
     log_gain: float
     p_value: float
+    told: float = 0.0
+    within: Fit | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Redefined:
+    """That a definition was put right, about which a machine is diagnosed anew.
+
+    Attributes
+    ----------
+    given : MachineSpec
+        As it was given.
+    wrong : WrongDirection
+        Where, as found of the given one.
+    """
+
+    given: MachineSpec
+    wrong: WrongDirection
+
+
+def defined_number(item: Misdescription, spec: Any, value: float = 0.0) -> Reported | None:
+    """The number of a direction's key in a definition changed by a value; None where no key has it."""
+    change = item.change
+    if not isinstance(change, Redefinable) or change.quantity(spec) is None:
+        return None
+    return change.quantity(change.redefined(spec, value))
+
+
+def departure(item: Misdescription, machine: DiagnosedMachine, value: float) -> float:
+    """How far a machine is from its definition as it was given, in the unit of a direction of this value."""
+    before, after = defined_number(item, machine.given), defined_number(item, machine.spec, value)
+    if before is None or after is None:
+        return value
+    return after.value - before.value if item.unit else after.value / before.value - 1.0
 
 
 def wrong_direction(
@@ -105,6 +147,19 @@ def _freed(box: Box, belief: Belief, null: Fit, row: int) -> Box:
     return replace(box, hessian=hessian, downhill=downhill, low=low, high=high, cost=cost)
 
 
+def definition_is_wrong(judgement: Judgement) -> bool:
+    """Whether it is the definition that is off, with nothing missing."""
+    return judgement.verdict == "parameter" and not judgement.chosen.fit.candidates
+
+
+def open_directions(
+    directions: Sequence[Misdescription], redefined: Redefined | None
+) -> tuple[Misdescription, ...]:
+    """Directions, that in which the definition was put right ``WIDER`` times as wide."""
+    name = None if redefined is None else redefined.wrong.direction.name
+    return tuple(replace(i, sigma=WIDER * i.sigma) if i.name == name else i for i in directions)
+
+
 def without_prior(belief: Belief, row: int) -> Belief:
     """The belief with another ``WIDER`` standard deviations of one coordinate, and bounds as much wider."""
     unit = np.zeros(len(belief.mean))
@@ -119,7 +174,7 @@ def without_prior(belief: Belief, row: int) -> Belief:
 
 
 def with_wrong_definition(
-    judgement: Judgement, null: Fit, wrong: WrongDirection | None, told: float = 0.0
+    judgement: Judgement, null: Fit, wrong: WrongDirection | None, machine: DiagnosedMachine
 ) -> Judgement:
     """A judgement that nothing is missing, changed to a wrong definition if its direction explains more.
 
@@ -127,18 +182,20 @@ def with_wrong_definition(
     ----------
     null : Fit
         With nothing missing, that prior given up.
-    told : float
-        What held-out readings become likelier by, as a logarithm that counts. As for a set of effects, the
-        sum with what fitted ones do must be twenty to one.
     """
     if wrong is None or judgement.verdict != "consistent":
         return judgement
-    if wrong.log_gain + told < tuned.LEAST_HELDOUT_GAIN:
+    # As for a set of effects, what fitted and held-out readings say together must be twenty to one.
+    if wrong.log_gain + wrong.told < tuned.LEAST_HELDOUT_GAIN or wrong.p_value > tuned.SIGNIFICANT:
         return judgement
     item = wrong.direction
-    index = next(i for i, c in enumerate(null.coordinates) if c.name == item.coordinate)
-    if abs(null.position[index]) <= PRIOR_SIGMAS or wrong.p_value > tuned.SIGNIFICANT:
+    value = null.values[item.coordinate]
+    beyond = departure(item, machine, value)
+    if abs(beyond) <= PRIOR_SIGMAS * item.sigma:
         return judgement
-    amount = f"{null.values[item.coordinate]:.3g} {item.unit}".strip()
-    reason = f"the definition is off at {item.key}: {item.statement}, by {amount}"
+    before, after = defined_number(item, machine.given), defined_number(item, machine.spec, value)
+    amount = f"{item.statement}, by {f'{beyond:.3g} {item.unit}'.strip()}"
+    if before is not None and after is not None:
+        amount = f"it says {quantity(before)}, the recording {quantity(after)}"
+    reason = f"the definition is off at {item.key}: {amount}"
     return replace(judgement, verdict="parameter", p_value=wrong.p_value, reason=reason)

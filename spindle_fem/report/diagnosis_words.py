@@ -78,9 +78,7 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         )
     wrong = (content.get("misdescription") or {}).get("wrong")
     if wrong is not None:
-        return (
-            f"{misdescription_words(wrong)} The definition is off there ({wrong['key']}). {_improvement(fit)}"
-        )
+        return f"{wrong_definition_words(wrong)} {_improvement(fit)}"
     statements = " ".join(item["statement"] for item in content["findings"])
     lead = "" if verdict == "sensor" else _heat_words(content)
     doubt = str(content.get("reason") or "").rstrip(".")
@@ -145,6 +143,23 @@ def misdescription_words(row: Mapping[str, Any]) -> str:
     unit = f" {row['unit']}" if row["unit"] else ""
     middle, low, high = (significant(row[key]) for key in ("value", "low", "high"))
     return f"{capital(row['statement'])}: {middle}{unit} ({low} to {high}{unit})."
+
+
+def wrong_definition_words(row: Mapping[str, Any]) -> str:
+    """A definition that is wrong, with what holds instead where a number of it is.
+
+    >>> number = {"given": 3.0, "value": 5.1, "low": 4.7, "high": 5.5, "unit": "mm"}
+    >>> wrong_definition_words({"key": "channel.depth", "defined": number})
+    'The definition is off at channel.depth: 5.10 mm (4.70 to 5.50), where it says 3.00.'
+    """
+    if "defined" not in row:
+        return f"{misdescription_words(row)} The definition is off there ({row['key']})."
+    number = row["defined"]
+    given, middle, low, high = (significant(number[key]) for key in ("given", "value", "low", "high"))
+    return (
+        f"The definition is off at {row['key']}: {middle} {number['unit']} ({low} to {high}), "
+        f"where it says {given}."
+    )
 
 
 def chance(value: float | None) -> str:

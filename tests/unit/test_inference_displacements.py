@@ -251,7 +251,7 @@ def test_an_expansion_that_is_off_is_told_in_micrometres(heated):
     made = SimpleNamespace(
         predictor=predictor, unchanged=predictor, final=fit, stated_fit=fit, null=fit, judgement=judgement
     )
-    content = misdescription_content(made)
+    content = misdescription_content(made, SimpleNamespace())
     (row,) = content["left_open"]
     assert (row["name"], row["channel"], row["largest_K"]) == ("expansion", "S1", 0.0)
     # Most of the growth is 3 µm/K of the shaft less 1.2 µm/K of the housing.

@@ -283,16 +283,16 @@ def test_a_fit_that_was_begun_is_run_once(predictor, monkeypatch):
     assert not fit.serves(nothing, "own", fit.options)
     assert not fit.serves(nothing, "coarse", replace(fit.options, error=0.5))
     diagnosis = diagnosis_of(predictor, nothing, heat)
-    with_begun, without = (full_model_errors(diagnosis, machine, begun=item) for item in (begun, None))
+    with_begun, without = (full_model_errors(diagnosis, machine, begun=item) for item in ((begun,), ()))
     assert repr(with_begun) == repr(without)
     assert ran == [heat, nothing, nothing, heat]
     begun.begin(predictor, heat)
     ran.clear()
     prepared_for.clear()
-    assert repr(full_model_errors(diagnosis, machine, begun=begun)) == repr(without)
+    assert repr(full_model_errors(diagnosis, machine, begun=[begun])) == repr(without)
     assert ran == [nothing, heat]
     ran.clear()
-    full_model_errors(diagnosis_of(predictor, nothing, nothing), machine, begun=begun)
+    full_model_errors(diagnosis_of(predictor, nothing, nothing), machine, begun=[begun])
     assert ran == [nothing]
     assert prepared_for == []
 
@@ -325,7 +325,7 @@ def test_what_drawings_leave_open_counts_as_it_does_without_the_set_before_and_b
     begun.begin(without, nothing)
     begun.begin(beside, heat)
     diagnosis = diagnosis_of(beside, nothing, heat, unchanged=without)
-    found = full_model_errors(diagnosis, machine, begun=begun, keep=kept.__setitem__)
+    found = full_model_errors(diagnosis, machine, begun=[begun], keep=kept.__setitem__)
     for name, plant, fit in (("before", without, nothing), ("after", beside, heat)):
         np.testing.assert_allclose(kept[name][0], predictions_at_stamps(plant, fit)[0], atol=1e-9)
     for row in found["differences"]:
@@ -345,7 +345,7 @@ def test_a_machine_that_cannot_be_meshed_ahead_is_told_where_errors_are_asked_fo
     begun.prepare()
     begun.begin(predictor, nothing)
     assert begun.fits == []
-    found = full_model_errors(diagnosis_of(predictor, nothing, heat), machine, begun=begun)
+    found = full_model_errors(diagnosis_of(predictor, nothing, heat), machine, begun=[begun])
     assert found["reason"] == "It could not be run: mesh: no mesh. Another geometry."
 
 

@@ -39,6 +39,7 @@ from spindle_fem.report.diagnosis_words import verdict_sentence
 from tests.support.diagnosed_spindle import TIMES, Case, written
 from tests.support.lumped_spindle import lumped_model
 
+GIVEN = SimpleNamespace(spec=None, given=None)  # no key of it is asked for
 FRONT = ("F1", "F2", "F3")
 SHAPE = "heat_shape.front.1"
 ALWAYS = (0.0, 1000.0), (1.0, 1.0)
@@ -271,7 +272,7 @@ def test_a_definition_far_off_in_one_direction_is_found_there(off_at):
     # What was foreseen to first order and between bounds is what the wider prior then gives.
     assert wrong.log_gain == pytest.approx(counted(problem, null, refitted, wrong), rel=0.02)
     nothing = Judgement("consistent", 0.5, Ranked(Hypothesis(refitted, 0.0), 1.0), (), 0.0, "")
-    judged = with_wrong_definition(nothing, refitted, wrong)
+    judged = with_wrong_definition(nothing, refitted, wrong, GIVEN)
     assert judged.verdict == "parameter"
     assert "heat.table" in judged.reason
     assert judged.p_value < 0.01
@@ -295,7 +296,7 @@ def test_a_definition_within_its_prior_is_not_wrong(off_at):
     wrong = wrong_direction(problem, null, problem.predictor.misdescribed, 100)
     assert wrong.log_gain < 0.0
     nothing = Judgement("consistent", 0.5, Ranked(Hypothesis(null, 0.0), 1.0), (), 0.0, "")
-    assert with_wrong_definition(nothing, null, wrong) is nothing
+    assert with_wrong_definition(nothing, null, wrong, GIVEN) is nothing
 
 
 def test_columns_go_where_the_predictor_goes(predictor):
@@ -330,7 +331,8 @@ def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
     directions = problem.predictor.misdescribed
     wrong = wrong_direction(problem, null, directions, 100)
     fit = Problem(problem.predictor, wrong.belief, EXPECTED_SLOW, problem.observations).fit()
-    verdict = SimpleNamespace(verdict="parameter")
+    nothing = Ranked(Hypothesis(fit, 0.0), 1.0)
+    verdict = Judgement("parameter", 0.001, nothing, (), 0.0, "")
     content = misdescription_content(
         SimpleNamespace(
             predictor=problem.predictor,
@@ -340,7 +342,8 @@ def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
             null=fit,
             judgement=verdict,
             wrong=wrong,
-        )
+        ),
+        GIVEN,
     )
     assert content["directions"] == len(directions)
     told = content["wrong"]

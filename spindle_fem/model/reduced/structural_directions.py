@@ -16,7 +16,7 @@ from scipy import sparse
 
 from spindle_fem.definition.machine_spec import AnnulusSegment, MachineSpec, Part
 from spindle_fem.definition.stream_films import StreamFilm
-from spindle_fem.definition.tolerances import DIAMETER_SHARE, PLACE, sigma_of
+from spindle_fem.definition.tolerances import DIAMETER_SHARE, PLACE, TolerancedLength, sigma_of
 from spindle_fem.machine.geometry.joint_groups import group_of_contacts
 from spindle_fem.machine.meshing.tagged_mesh import TaggedMesh
 from spindle_fem.machine.view.part_roles import Layout
@@ -246,7 +246,10 @@ def with_channel(spec: MachineSpec, changes: Mapping[str, float]) -> MachineSpec
     """A machine with keys of its channel changed by some m."""
     if not changes:
         return spec
-    keys = {key: getattr(spec.channel, key) + change for key, change in changes.items()}
+    keys = {}
+    for key, change in changes.items():
+        own = getattr(spec.channel, key)
+        keys[key] = TolerancedLength(own + change, getattr(own, "sigma", None))
     return spec.model_copy(update={"channel": spec.channel.model_copy(update=keys)})
 
 
