@@ -291,7 +291,10 @@ def diagnose_recordings(
     if chosen_fit.candidates:
         settled(about_chosen.predictor, followed.fit if followed.states else chosen_fit)
     explanations = []
-    about = problem.fit((), null.fit.values)
+    if definition_is_wrong(judgement) and machine.redefined is None:
+        # Where heat would be missing of the machine as its definition was given.
+        problem = replace(problem, belief=calibrated.known)
+    about = problem.fit((), before.values)
     patterns = [Pattern(spot, tuple(p for p in own if p in known)) for spot, own in view.spots.items()]
     for number in range(len(recordings)):
         explanations += [

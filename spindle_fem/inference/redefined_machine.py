@@ -42,7 +42,7 @@ def with_definition_put_right(
     Returns
     -------
     (DiagnosedMachine, Diagnosis)
-        ``unchanged`` and ``null`` are those of the definition as it was given.
+        ``unchanged``, ``null`` and ``explanations`` are those of the definition as it was given.
     """
     wrong = diagnosis.wrong
     if wrong is None or defined_number(wrong.direction, machine.spec) is None:
@@ -70,7 +70,8 @@ def with_definition_put_right(
             break
     if opened is machine:
         return machine, found
-    return opened, replace(found, unchanged=diagnosis.unchanged, null=wrong.within or diagnosis.null)
+    as_given = {"unchanged": diagnosis.unchanged, "explanations": diagnosis.explanations}
+    return opened, replace(found, **as_given, null=wrong.within or diagnosis.null)
 
 
 def _fitted(fit: Fit, item: Misdescription) -> tuple[float, float]:

@@ -150,7 +150,7 @@ def wrong_definition_words(row: Mapping[str, Any]) -> str:
 
     >>> number = {"given": 3.0, "value": 5.1, "low": 4.7, "high": 5.5, "unit": "mm"}
     >>> wrong_definition_words({"key": "channel.depth", "defined": number})
-    'The definition is off at channel.depth: 5.10 mm (4.70 to 5.50), where it says 3.00.'
+    'The definition is off at channel.depth: 5.1 mm (4.7 to 5.5), where it says 3.'
     """
     if "defined" not in row:
         return f"{misdescription_words(row)} The definition is off there ({row['key']})."
@@ -309,6 +309,9 @@ def checks(content: Mapping[str, Any]) -> list[str]:
         return ["Nothing: the machine does what its definition says."]
     effects = catalogue()
     found: dict[str, None] = {}
+    wrong = (content.get("misdescription") or {}).get("wrong")
+    if wrong is not None:
+        found[f"Drawing, data sheet or machine: is {wrong['key']} as the definition has it?"] = None
     sets = [content["findings"], *(item["findings"] for item in content["alternatives"])]
     for item in [finding for findings in sets for finding in findings]:
         text = item.get("check") or (effects[item["effect"]].check if item["effect"] in effects else "")

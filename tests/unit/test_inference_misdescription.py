@@ -35,7 +35,7 @@ from spindle_fem.inference.verdict import Judgement
 from spindle_fem.inference.wrong_definition import WIDER, with_wrong_definition, wrong_direction
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.report.diagnosis_tables import misdescription_blocks
-from spindle_fem.report.diagnosis_words import verdict_sentence
+from spindle_fem.report.diagnosis_words import checks, verdict_sentence
 from tests.support.diagnosed_spindle import TIMES, Case, written
 from tests.support.lumped_spindle import lumped_model
 
@@ -360,6 +360,11 @@ def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
         "fit": {when: {"heldout_rmse_K": 0.1} for when in ("before", "after")} | {"noise_K": 0.1},
     }
     assert "Heat of F1: 0." in verdict_sentence(whole)
+    whole |= {"alternatives": []}
+    assert checks(whole) == ["Drawing, data sheet or machine: is heat.table as the definition has it?"]
+    number = {"given": 22.0, "value": 47.5, "low": 42.0, "high": 53.9, "unit": "W/(m·K)"}
+    by_key = whole | {"misdescription": content | {"wrong": told | {"defined": number}}}
+    assert "off at heat.table: 47.5 W/(m·K) (42 to 53.9), where it says 22." in verdict_sentence(by_key)
     table, text = misdescription_blocks(whole)
     assert "heat of F1" in table.rows[0]["cells"]
     assert "heat.table" in text.text

@@ -68,7 +68,7 @@ def diagnosis_of(item, value, verdict="parameter", candidates=()):
 class SimpleDiagnosis(SimpleNamespace):
     """With what :func:`dataclasses.replace` needs."""
 
-    unchanged, null, notes = "of this machine", "of this fit", ()
+    unchanged, null, explanations, notes = "of this machine", "of this fit", "of this heat", ()
 
 
 @pytest.fixture
