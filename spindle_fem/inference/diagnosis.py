@@ -39,17 +39,18 @@ from spindle_fem.inference.prepared_problem import (
 from spindle_fem.inference.recording_clocks import on_clock_of_inputs
 from spindle_fem.inference.search_basis import acted_on, on_smaller_bases, smaller_predictors
 from spindle_fem.inference.search_course import run_search
-from spindle_fem.inference.set_odds import best_gain, rank
+from spindle_fem.inference.set_odds import rank
 from spindle_fem.inference.set_problems import SetProblems, combination_of
 from spindle_fem.inference.verdict import Judgement, judge
 from spindle_fem.inference.worker_processes import Workers
 from spindle_fem.inference.wrong_definition import (
-    Redefined,
     WrongDirection,
-    definition_is_wrong,
+    defined_number,
+    is_beyond_prior,
     open_directions,
+    suspected_direction,
+    suspected_of_calibration,
     with_wrong_definition,
-    wrong_direction,
 )
 from spindle_fem.parallel import thread_count
 
@@ -83,7 +84,9 @@ class Diagnosis:
         How the held-out readings were chosen.
     seconds : mapping of stage to float
     wrong : WrongDirection or None
-        Direction whose prior was given up.
+        Where the definition is wrong.
+    suspected : WrongDirection or None
+        A number of it that is to be tried by making the machine anew.
     followed : Followed or None
         The chosen set with states and moments that all readings tell.
     notes : tuple of str
@@ -103,6 +106,7 @@ class Diagnosis:
     candidates_tried: int
     seconds: Mapping[str, float]
     wrong: WrongDirection | None = None
+    suspected: WrongDirection | None = None
     followed: Followed | None = None
     notes: tuple[str, ...] = ()
 
@@ -174,9 +178,7 @@ def diagnose_recordings(
     directions = open_directions(misdescriptions_of(predictor), machine.redefined)
     candidates = candidates_for(view, len(recordings))
     places = sorted(acted_on(predictor, view, candidates))
-    calibrating = workers.ahead(
-        partial(_calibrated, earlier, predictor, directions, places, machine.redefined)
-    )
+    calibrating = workers.ahead(partial(_calibrated, earlier, predictor, directions, places, machine))
     small, predictor, known = smaller_predictors(predictor, view, candidates)
     predictor = with_misdescriptions(predictor, directions)
     small = small.misdescribed_like(predictor)
@@ -207,15 +209,17 @@ def diagnose_recordings(
     slow = slow_error_of(problem, best.fit)
     trials = len({(c.effect, c.component) for c in candidates})
     empty = next(h for h in found if not h.fit.candidates)
-    wrong = None
-    if machine.redefined is None:
-        wrong = wrong_direction(problem, empty.fit, directions, trials, coarseness)
-    if wrong is not None and wrong.log_gain > best_gain(found, coarseness):
+    wrong, belief = calibrated.suspected, calibrated.known
+    if machine.redefined is not None:
+        wrong = None
+    elif wrong is None:
+        wrong = suspected_direction(problem, found, directions, trials, coarseness, machine.spec)
+    # What is a number of the definition is tried by making the machine anew.
+    freed = wrong is not None and defined_number(wrong.direction, machine.spec) is None
+    if freed:
         belief = wrong.belief
         problem = Problem(small, belief, slow, small.observations)
         slow = slow_error_of(problem, problem.fit((), empty.fit.values))
-    else:
-        wrong, belief = None, calibrated.known
     unchanged = predictor
     if machine.is_network:
         unchanged = with_misdescriptions(predictor, directions, empty.fit.values)
@@ -266,18 +270,17 @@ def diagnose_recordings(
         coarseness=coarseness,
     )
     null = next(h for h in refitted if not h.fit.candidates)
-    if machine.redefined is not None:
-        wrong = machine.redefined.wrong
-    elif wrong is not None:
+    before, told = null.fit, None
+    if freed and judgement.verdict == "consistent":
         as_known = Problem(problems.plain.predictor, calibrated.known, slow, predictor.observations)
-        wrong = replace(wrong, within=as_known.fit((), null.fit.values))
+        within = as_known.fit((), null.fit.values)
         if null.heldout is not None:
-            gain = 0.5 * (readings.heldout_misfit(wrong.within) - null.heldout)
+            gain = 0.5 * (readings.heldout_misfit(within) - null.heldout)
             wrong = replace(wrong, told=gain / (coarseness * tuned.GAIN_DIVISOR))
-    judgement = with_wrong_definition(judgement, null.fit, wrong, machine)
-    before = null.fit
-    if wrong is not None and wrong.within is not None and definition_is_wrong(judgement):
-        before = wrong.within
+        if wrong.is_beyond_chance and is_beyond_prior(wrong, machine, null.fit):
+            judgement = with_wrong_definition(judgement, wrong, machine)
+            # Without it, and where heat is missing then.
+            before, told, problem = within, wrong, replace(problem, belief=calibrated.known)
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit
     about_chosen = problems.of(chosen_fit)
@@ -291,9 +294,6 @@ def diagnose_recordings(
     if chosen_fit.candidates:
         settled(about_chosen.predictor, followed.fit if followed.states else chosen_fit)
     explanations = []
-    if definition_is_wrong(judgement) and machine.redefined is None:
-        # Where heat would be missing of the machine as its definition was given.
-        problem = replace(problem, belief=calibrated.known)
     about = problem.fit((), before.values)
     patterns = [Pattern(spot, tuple(p for p in own if p in known)) for spot, own in view.spots.items()]
     for number in range(len(recordings)):
@@ -314,7 +314,8 @@ def diagnose_recordings(
         chosen[0][1],
         tried,
         clock.laps,
-        wrong,
+        told,
+        None if freed else wrong,
         followed,
         notes,
     )
@@ -330,18 +331,19 @@ def _calibrated(
     predictor: Predictor,
     directions: Sequence[Misdescription],
     places: Sequence[str],
-    redefined: Redefined | None,
+    machine: DiagnosedMachine,
 ) -> Calibrated:
     """What is known of a machine on the recordings to be diagnosed, from those of its calibration if any.
 
     ``places`` are those where something may act: what is not exact of the machine acts there too.
     """
+    suspect = partial(suspected_of_calibration, directions=directions, spec=machine.spec)
     if earlier is not None:
-        found = open_directions(misdescriptions_of(earlier), redefined)
+        found = open_directions(misdescriptions_of(earlier), machine.redefined)
         if not earlier.is_network:
             _, earlier = on_smaller_bases(earlier, [prior.name for prior in earlier.uncertain()], places)
         earlier = with_misdescriptions(earlier, found)
-    return calibrate(earlier, predictor.misdescribed_by(directions, {}))
+    return calibrate(earlier, predictor.misdescribed_by(directions, {}), suspect)
 
 
 def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:

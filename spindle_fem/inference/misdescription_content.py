@@ -11,7 +11,7 @@ from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.misdescription import EVERY_CHANNEL, Misdescription
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
-from spindle_fem.inference.wrong_definition import defined_number, definition_is_wrong, departure
+from spindle_fem.inference.wrong_definition import defined_number, departure
 from spindle_fem.units import NORMAL_90_PERCENT
 
 # Directions that are listed: those moved by this many standard deviations of their priors, so many at most.
@@ -38,7 +38,7 @@ def misdescription_content(diagnosis: Diagnosis, machine: DiagnosedMachine) -> d
     final, null = (diagnosis.predictor, diagnosis.stated_fit), (diagnosis.unchanged, diagnosis.null)
     found = bool(diagnosis.final.candidates)
     wrong = None
-    if definition_is_wrong(diagnosis.judgement) and diagnosis.wrong is not None:
+    if diagnosis.wrong is not None:
         wrong = _wrong_row(*final, diagnosis.wrong.direction, machine)
     return {
         "directions": len(diagnosis.predictor.misdescribed),

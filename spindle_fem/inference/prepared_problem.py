@@ -59,12 +59,15 @@ class Calibrated:
         With the readings themselves where the machine is a network, whose values are guesses.
     fit : Fit or None
         None without calibration recordings.
+    suspected : object or None
+        What ``suspect`` of :func:`calibrate` says.
     """
 
     belief: Belief
     known: Belief
     slow: SlowError
     fit: Fit | None
+    suspected: Any = None
 
 
 def machine_coordinates(predictor: Predictor) -> tuple[Coordinate, ...]:
@@ -274,7 +277,11 @@ def _network_scales(predictor: Predictor) -> tuple[float, list[float]]:
     return max(noise, tuned.NETWORK_SHARE_OF_RISE * float(np.median(moved))), times.tolist()
 
 
-def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
+def calibrate(
+    earlier: Predictor | None,
+    predictor: Predictor,
+    suspect: Callable[[Problem, Fit], Any] = lambda problem, fit: None,
+) -> Calibrated:
     """Fit calibration recordings; the prior where there are none.
 
     Parameters
@@ -283,6 +290,8 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
         The machine on its calibration recordings.
     predictor : Predictor
         On those to be diagnosed.
+    suspect : callable
+        Says what is suspicious of the fit to calibration recordings of a machine with geometry.
     """
     shared, begun = machine_coordinates(predictor), start_coordinates(predictor)
     if earlier is None:
@@ -316,7 +325,7 @@ def calibrate(earlier: Predictor | None, predictor: Predictor) -> Calibrated:
     root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
     after = Belief((*shared, *begun), mean, root)
     if not predictor.is_network:
-        return Calibrated(after, after, slow, fit)
+        return Calibrated(after, after, slow, fit, suspect(problem, fit))
     problem = Problem(earlier, prior, slow, earlier.observations)
     own = EarlierReadings.about(problem, problem.fit((), fit.values, iterations=0))
     return Calibrated(after, replace(belief, earlier=own, begin=mean), slow, fit)

@@ -1,7 +1,7 @@
 """A machine whose definition is wrong, made anew with the value that its recordings show.
 
-To first order a fit says in which direction a definition is wrong. How far is asked of the machine with
-another value, until the recordings ask for no other.
+To first order a fit says in which direction a definition is wrong. How far, and whether it is, is asked of
+the machine with another value, until the recordings ask for no other.
 """
 
 from __future__ import annotations
@@ -9,13 +9,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from spindle_fem.effects.framework.effect import capital
 from spindle_fem.errors import SpindleFemError
+from spindle_fem.inference import tuned
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.opened_machine import DiagnosedMachine, with_definition
-from spindle_fem.inference.verdict import PRIOR_SIGMAS
-from spindle_fem.inference.wrong_definition import Redefined, defined_number, definition_is_wrong
+from spindle_fem.inference.set_odds import log_odds
+from spindle_fem.inference.wrong_definition import (
+    Redefined,
+    WrongDirection,
+    is_beyond_prior,
+    with_wrong_definition,
+    wrong_definition_words,
+)
 
 # Times that a machine is made anew at most: the second value is within a few per cent of the third.
 MOST_TIMES = 3
@@ -29,8 +37,8 @@ def with_definition_put_right(
 ) -> tuple[DiagnosedMachine, Diagnosis]:
     """The machine with the definition that its recordings show, and its diagnosis; else both as they are.
 
-    A machine is made anew where the prior of a number of its definition was given up and what was found
-    needs it to be elsewhere. That is told if then nothing is missing.
+    A machine is made anew with another number where one is suspected. That is told where its own calibration
+    says so, or where it makes the recordings twenty times as likely.
 
     Parameters
     ----------
@@ -44,34 +52,56 @@ def with_definition_put_right(
     (DiagnosedMachine, Diagnosis)
         ``unchanged``, ``null`` and ``explanations`` are those of the definition as it was given.
     """
-    wrong = diagnosis.wrong
-    if wrong is None or defined_number(wrong.direction, machine.spec) is None:
+    wrong = diagnosis.suspected
+    if wrong is None:
         return machine, diagnosis
-    item, opened, found = wrong.direction, machine, diagnosis
-    value, width = _fitted(diagnosis.final, item)
-    if abs(value) <= PRIOR_SIGMAS * item.sigma:
-        return machine, diagnosis
-    redefined = Redefined(machine.spec, wrong)
+    item, opened, found, value = wrong.direction, machine, diagnosis, wrong.value
     for _ in range(MOST_TIMES):
         progress(f"definition put right: {item.key}")
         try:
-            other = with_definition(opened, item.change.redefined(opened.spec, value), progress)
-            other = replace(other, redefined=redefined)
+            spec = item.change.redefined(opened.spec, value)
+            other = replace(with_definition(opened, spec, progress), redefined=Redefined(machine.spec, wrong))
             again = diagnosed(other)
         except SpindleFemError as error:
             note = f"The machine could not be made anew with another {item.key}: {error}"
             found = replace(found, notes=(*found.notes, note))
             break
-        if not definition_is_wrong(again.judgement):
+        if opened is machine and not _is_told(wrong, diagnosis, other, again):
             break
         opened, found = other, again
-        value, width = _fitted(found.final, item)
+        value, width = _fitted(_telling(wrong, found), item)
         if abs(value) <= width:
             break
     if opened is machine:
         return machine, found
-    as_given = {"unchanged": diagnosis.unchanged, "explanations": diagnosis.explanations}
-    return opened, replace(found, **as_given, null=wrong.within or diagnosis.null)
+    judgement, notes = with_wrong_definition(found.judgement, wrong, opened), found.notes
+    if judgement is found.judgement:
+        notes = (capital(wrong_definition_words(wrong, opened, found.final)), *notes)
+    return opened, replace(
+        found,
+        judgement=judgement,
+        wrong=wrong,
+        notes=notes,
+        unchanged=diagnosis.unchanged,
+        null=diagnosis.null,
+        explanations=diagnosis.explanations,
+    )
+
+
+def _is_told(wrong: WrongDirection, given: Diagnosis, other: DiagnosedMachine, again: Diagnosis) -> bool:
+    """Whether a definition is wrong, by the machine made anew with another number."""
+    if not is_beyond_prior(wrong, other, _telling(wrong, again)):
+        return False
+    if wrong.by_calibration:
+        return True
+    odds = log_odds(again.hypotheses, given.hypotheses, wrong.log_prior, given.coarseness)
+    return odds >= tuned.LEAST_HELDOUT_GAIN
+
+
+def _telling(wrong: WrongDirection, found: Diagnosis) -> Fit:
+    """The fit that says where the number is."""
+    calibrated = found.calibrated.fit if wrong.by_calibration else None
+    return found.final if calibrated is None else calibrated
 
 
 def _fitted(fit: Fit, item: Misdescription) -> tuple[float, float]:

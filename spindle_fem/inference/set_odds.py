@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.special import logsumexp
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked
@@ -74,11 +75,19 @@ def tempered(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> list[
     return [score + less[len(item.fit.candidates)] for item, score in zip(hypotheses, scores, strict=True)]
 
 
-def best_gain(hypotheses: Sequence[Hypothesis], coarseness: float = 1.0) -> float:
-    """What the best hypothesis gains over nothing missing, as :func:`tempered` counts it; 0 at least."""
-    scores = tempered(hypotheses, coarseness)
-    empty = next(score for score, h in zip(scores, hypotheses, strict=True) if not h.fit.candidates)
-    return max(scores) - empty
+def log_odds(
+    one: Sequence[Hypothesis], other: Sequence[Hypothesis], log_prior: float, coarseness: float = 1.0
+) -> float:
+    """Logarithm of the odds of one machine's hypotheses over another's of the same readings.
+
+    Parameters
+    ----------
+    log_prior : float
+        Of the one machine over the other.
+    """
+    scores = np.array(tempered([*other, *one], coarseness))
+    ours, theirs = scores[len(other) :], scores[: len(other)]
+    return float(logsumexp(ours) - logsumexp(theirs)) + log_prior
 
 
 def any_magnitude(fit: Fit) -> float:

@@ -11,20 +11,27 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Reported, quantity
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import THETA_BOUND, Belief
+from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.linearised_fit import Box, LinearProblem, bounded_minimum
 from spindle_fem.inference.misdescription import Misdescription, Redefinable
 from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.set_odds import tempered
 from spindle_fem.inference.verdict import PRIOR_SIGMAS, Judgement
+
+Array = NDArray[np.float64]
 
 # Width of the prior of what is wrong, in standard deviations of the one that is given up.
 WIDER = 10.0
+# Effects beside which a wrong definition is looked for, at most.
+MOST_BESIDE = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,22 +42,33 @@ class WrongDirection:
     ----------
     belief : Belief
         With that prior given up.
+    value : float
+        What is foreseen of it then, in its unit.
     log_gain : float
         What the data become likelier by, priors and the wider one's complexity included.
+    log_prior : float
+        Of one direction among all of them and all effects, over none.
     p_value : float
         Probability of so large a gain in any of the directions if the definition were right.
     told : float
         What held-out readings become likelier by, as a logarithm that counts.
-    within : Fit or None
-        Nothing missing, that prior kept.
+    by_calibration : bool
+        Whether the machine's own calibration says so.
     """
 
     direction: Misdescription
     belief: Belief
+    value: float
     log_gain: float
+    log_prior: float
     p_value: float
     told: float = 0.0
-    within: Fit | None = None
+    by_calibration: bool = False
+
+    @property
+    def is_beyond_chance(self) -> bool:
+        """Whether what fitted and held-out readings say together is twenty to one, as of a set of effects."""
+        return self.log_gain + self.told >= tuned.LEAST_HELDOUT_GAIN and self.p_value <= tuned.SIGNIFICANT
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +130,9 @@ def wrong_direction(
         return None
     rows = [names.index(item.coordinate) for item in owned]
     box = LinearProblem.about(problem, null).box
-    settled = _least(box)
-    misfit = np.array([settled - _least(_freed(box, belief, null, row)) for row in rows])
+    settled, _ = _least(box)
+    freed = [_least(_freed(box, belief, null, row)) for row in rows]
+    misfit = np.array([settled - cost for cost, _ in freed])
     count = len(names)
     precision = belief.root.T @ belief.root
     left = np.diag(precision - precision @ null.covariance[:count, :count] @ precision)[rows]
@@ -123,13 +142,68 @@ def wrong_direction(
     best = int(np.argmax(gains))
     level = float(chdtrc(1, misfit[best] / (coarseness * tuned.CHANCE_DIVISOR)))
     p_value = float(-np.expm1(len(owned) * np.log1p(-min(level, 1.0 - 1e-16))))
-    return WrongDirection(owned[best], without_prior(belief, rows[best]), float(gains[best]), p_value)
+    row = rows[best]
+    value = owned[best].sigma * float(null.position[row] + freed[best][1][row])
+    belief = without_prior(belief, row)
+    return WrongDirection(owned[best], belief, value, float(gains[best]), float(prior), p_value)
 
 
-def _least(box: Box) -> float:
-    """Least cost within a box."""
+def suspected_direction(
+    problem: Problem,
+    hypotheses: Sequence[Hypothesis],
+    directions: Sequence[Misdescription],
+    trials: int,
+    coarseness: float,
+    spec: Any,
+) -> WrongDirection | None:
+    """The direction whose prior had best be given up, with nothing missing or beside likely effects.
+
+    None unless that makes the recording likelier than any set does. Beside effects it must be a number of the
+    definition, which can be tried.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+        Of that problem.
+    spec : MachineSpec or NetworkMachineSpec
+    """
+    found, scores = None, tempered(hypotheses, coarseness)
+    most = max(scores)
+    likeliest: dict[int, tuple[float, Fit]] = {}
+    for score, item in zip(scores, hypotheses, strict=True):
+        size = len(item.fit.candidates)
+        if size <= MOST_BESIDE and score > likeliest.get(size, (-np.inf, None))[0]:
+            likeliest[size] = score, item.fit
+    for size, (score, fit) in likeliest.items():
+        wrong = wrong_direction(problem, fit, directions, trials, coarseness)
+        if wrong is None or score + wrong.log_gain <= most:
+            continue
+        if size and not (wrong.is_beyond_chance and defined_number(wrong.direction, spec) is not None):
+            continue
+        most, found = score + wrong.log_gain, wrong
+    return found
+
+
+def suspected_of_calibration(
+    problem: Problem, fit: Fit, directions: Sequence[Misdescription], spec: Any
+) -> WrongDirection | None:
+    """The number of the definition that a machine's own calibration holds beyond its prior; None else.
+
+    Nothing is missing there, so that no effect could explain it instead.
+    """
+    far = {c.name for c, u in zip(fit.coordinates, fit.position, strict=True) if abs(u) > PRIOR_SIGMAS}
+    if not any(i.coordinate in far and defined_number(i, spec) is not None for i in directions):
+        return None
+    wrong = wrong_direction(problem, fit, directions, 0)
+    if wrong is None or not wrong.is_beyond_chance or defined_number(wrong.direction, spec) is None:
+        return None
+    return replace(wrong, by_calibration=True)
+
+
+def _least(box: Box) -> tuple[float, Array]:
+    """Least cost within a box, and the move to it."""
     move = bounded_minimum(box.hessian, box.downhill, box.low, box.high)
-    return box.cost + float(move @ (box.hessian @ move)) - 2.0 * float(box.downhill @ move)
+    return box.cost + float(move @ (box.hessian @ move)) - 2.0 * float(box.downhill @ move), move
 
 
 def _freed(box: Box, belief: Belief, null: Fit, row: int) -> Box:
@@ -145,11 +219,6 @@ def _freed(box: Box, belief: Belief, null: Fit, row: int) -> Box:
     low[row], high[row] = -bound - null.position[row], bound - null.position[row]
     cost = box.cost - float(departure @ less @ departure)
     return replace(box, hessian=hessian, downhill=downhill, low=low, high=high, cost=cost)
-
-
-def definition_is_wrong(judgement: Judgement) -> bool:
-    """Whether it is the definition that is off, with nothing missing."""
-    return judgement.verdict == "parameter" and not judgement.chosen.fit.candidates
 
 
 def open_directions(
@@ -173,29 +242,35 @@ def without_prior(belief: Belief, row: int) -> Belief:
     return replace(belief, coordinates=tuple(coordinates), root=root)
 
 
-def with_wrong_definition(
-    judgement: Judgement, null: Fit, wrong: WrongDirection | None, machine: DiagnosedMachine
-) -> Judgement:
-    """A judgement that nothing is missing, changed to a wrong definition if its direction explains more.
-
-    Parameters
-    ----------
-    null : Fit
-        With nothing missing, that prior given up.
-    """
-    if wrong is None or judgement.verdict != "consistent":
-        return judgement
-    # As for a set of effects, what fitted and held-out readings say together must be twenty to one.
-    if wrong.log_gain + wrong.told < tuned.LEAST_HELDOUT_GAIN or wrong.p_value > tuned.SIGNIFICANT:
-        return judgement
-    item = wrong.direction
-    value = null.values[item.coordinate]
-    beyond = departure(item, machine, value)
-    if abs(beyond) <= PRIOR_SIGMAS * item.sigma:
-        return judgement
+def wrong_definition_words(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) -> str:
+    """Where a definition is wrong, and by how much in a fit."""
+    item, value = wrong.direction, fit.values[wrong.direction.coordinate]
     before, after = defined_number(item, machine.given), defined_number(item, machine.spec, value)
-    amount = f"{item.statement}, by {f'{beyond:.3g} {item.unit}'.strip()}"
-    if before is not None and after is not None:
-        amount = f"it says {quantity(before)}, the recording {quantity(after)}"
-    reason = f"the definition is off at {item.key}: {amount}"
-    return replace(judgement, verdict="parameter", p_value=wrong.p_value, reason=reason)
+    if before is None or after is None:
+        amount = f"{item.statement}, by {f'{value:.3g} {item.unit}'.strip()}"
+    else:
+        told_by = "calibration" if wrong.by_calibration else "recording"
+        amount = f"it says {quantity(before)}, the {told_by} {quantity(after)}"
+    return f"the definition is off at {item.key}: {amount}"
+
+
+def with_wrong_definition(
+    judgement: Judgement, wrong: WrongDirection, machine: DiagnosedMachine
+) -> Judgement:
+    """A judgement with a parameter that is off, by its definition.
+
+    Unless physics is missing beside it, or the calibration says so, against which the recording was held.
+    """
+    if wrong.by_calibration or judgement.verdict not in ("consistent", "sensor"):
+        return judgement
+    words = wrong_definition_words(wrong, machine, judgement.chosen.fit)
+    reason = "; ".join(filter(None, (words, judgement.reason)))
+    return replace(
+        judgement, verdict="parameter", p_value=min(judgement.p_value, wrong.p_value), reason=reason
+    )
+
+
+def is_beyond_prior(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) -> bool:
+    """Whether the direction of a fit is where its prior holds it with less than 1 %."""
+    item = wrong.direction
+    return abs(departure(item, machine, fit.values[item.coordinate])) > PRIOR_SIGMAS * item.sigma

@@ -33,6 +33,8 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         Of ``diagnosis.json``.
     """
     verdict, fit = content["verdict"], content["fit"]
+    wrong = (content.get("misdescription") or {}).get("wrong")
+    off = "" if wrong is None else f"{wrong_definition_words(wrong)} "
     if verdict == "unexplained" and not content["findings"]:
         reason = str(content.get("reason") or "the difference follows nothing that the catalogue holds")
         return f"The difference between recording and model is not explained: {reason.rstrip('.')}."
@@ -50,7 +52,7 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
             for item in content["alternatives"]
             if item["probability"] >= tuned.LISTED
         ]
-        return (
+        return off + (
             f"The recording agrees with the machine: what differs, {kelvin(fit['after']['heldout_rmse_K'])} "
             f"on held-out readings, is noise ({kelvin(fit['noise_K'])}), the slow error allowed to sensors "
             f"and model ({kelvin(content['slow_error']['sigma_K'])}) and what the uncertain parameters "
@@ -58,6 +60,7 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
             + (f" Not ruled out: {_or(others)}." if others else "")
         )
     if verdict == "ambiguous":
+        lead = off + _when(content)
         sets = [(content["findings"], content.get("set_probability"))]
         # One effect less is no other answer, unless it is likely.
         sets += [
@@ -69,21 +72,20 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         reason = str(content.get("reason") or "several sets explain the data").rstrip(".")
         if len(options) == 1:
             return (
-                f"{_when(content)}the readings differ from the model by more than noise and uncertain "
+                f"{lead}the readings differ from the model by more than noise and uncertain "
                 f"parameters. The likeliest set is {options[0]}, but {reason}. {_improvement(fit)}"
             )
         return (
-            f"{_when(content)}the readings differ from the model by more than noise and uncertain "
+            f"{lead}the readings differ from the model by more than noise and uncertain "
             f"parameters, but the data cannot tell apart {_or(options)}: {reason}. {_improvement(fit)}"
         )
-    wrong = (content.get("misdescription") or {}).get("wrong")
-    if wrong is not None:
-        return f"{wrong_definition_words(wrong)} {_improvement(fit)}"
+    if off and not content["findings"]:
+        return off + _improvement(fit)
     statements = " ".join(item["statement"] for item in content["findings"])
     lead = "" if verdict == "sensor" else _heat_words(content)
-    doubt = str(content.get("reason") or "").rstrip(".")
+    doubt = "" if off else str(content.get("reason") or "").rstrip(".")
     sure = f"Probability {chance(content.get('set_probability'))}.{f' {capital(doubt)}.' if doubt else ''}"
-    return f"{lead}{statements} {sure} {_improvement(fit)}"
+    return f"{lead}{statements} {sure} {off}{_improvement(fit)}"
 
 
 def sensors_named(content: Mapping[str, Any]) -> list[str]:

@@ -249,7 +249,13 @@ def test_an_expansion_that_is_off_is_told_in_micrometres(heated):
     fit = Problem(predictor, known_before(predictor), slow, predictor.observations).fit()
     judgement = SimpleNamespace(verdict="consistent")
     made = SimpleNamespace(
-        predictor=predictor, unchanged=predictor, final=fit, stated_fit=fit, null=fit, judgement=judgement
+        predictor=predictor,
+        unchanged=predictor,
+        final=fit,
+        stated_fit=fit,
+        null=fit,
+        judgement=judgement,
+        wrong=None,
     )
     content = misdescription_content(made, SimpleNamespace())
     (row,) = content["left_open"]

@@ -32,7 +32,14 @@ from spindle_fem.inference.mounting_misdescriptions import Bridge, mounting_misd
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
 from spindle_fem.inference.verdict import Judgement
-from spindle_fem.inference.wrong_definition import WIDER, with_wrong_definition, wrong_direction
+from spindle_fem.inference.wrong_definition import (
+    WIDER,
+    is_beyond_prior,
+    suspected_direction,
+    suspected_of_calibration,
+    with_wrong_definition,
+    wrong_direction,
+)
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.report.diagnosis_tables import misdescription_blocks
 from spindle_fem.report.diagnosis_words import checks, verdict_sentence
@@ -271,11 +278,36 @@ def test_a_definition_far_off_in_one_direction_is_found_there(off_at):
     assert refitted.misfit_with_prior < null.misfit_with_prior - 20.0
     # What was foreseen to first order and between bounds is what the wider prior then gives.
     assert wrong.log_gain == pytest.approx(counted(problem, null, refitted, wrong), rel=0.02)
+    assert wrong.value == pytest.approx(refitted.values[wrong.direction.coordinate], abs=0.02)
+    assert wrong.is_beyond_chance
+    assert is_beyond_prior(wrong, GIVEN, refitted)
     nothing = Judgement("consistent", 0.5, Ranked(Hypothesis(refitted, 0.0), 1.0), (), 0.0, "")
-    judged = with_wrong_definition(nothing, refitted, wrong, GIVEN)
+    judged = with_wrong_definition(nothing, wrong, GIVEN)
     assert judged.verdict == "parameter"
     assert "heat.table" in judged.reason
     assert judged.p_value < 0.01
+    # beside physics that is missing, or by the calibration, the verdict is that of the recording
+    physics = replace(nothing, verdict="missing_physics")
+    assert with_wrong_definition(physics, wrong, GIVEN) is physics
+    assert with_wrong_definition(nothing, replace(wrong, by_calibration=True), GIVEN) is nothing
+    lying = replace(nothing, verdict="sensor", reason="a sensor lies")
+    assert with_wrong_definition(lying, wrong, GIVEN).reason.endswith("; a sensor lies")
+
+
+def test_a_direction_is_suspected_where_it_explains_more_than_any_set(case, off_at):
+    problem, null = off_at(1.6)
+    directions, heat = problem.predictor.misdescribed, case.candidates["heat_scale", "F1"]
+    nothing, other = Hypothesis(null, 0.0), Hypothesis(problem.fit((heat,)), -10.0)
+
+    def suspected(*hypotheses):
+        return suspected_direction(problem, hypotheses, directions, 100, 1.0, None)
+
+    assert suspected(nothing).direction.name == "F1"
+    # the same heat as an effect, unless that is unlikely beforehand
+    assert suspected(nothing, replace(other, log_prior=20.0)) is None
+    assert suspected(nothing, replace(other, log_prior=-100.0)).direction.name == "F1"
+    # no number of a definition could be tried, by a calibration or beside effects
+    assert suspected_of_calibration(problem, null, directions, None) is None
 
 
 def counted(problem, null, refitted, wrong, trials=100):
@@ -295,8 +327,8 @@ def test_a_definition_within_its_prior_is_not_wrong(off_at):
     problem, null = off_at(1.02)
     wrong = wrong_direction(problem, null, problem.predictor.misdescribed, 100)
     assert wrong.log_gain < 0.0
-    nothing = Judgement("consistent", 0.5, Ranked(Hypothesis(null, 0.0), 1.0), (), 0.0, "")
-    assert with_wrong_definition(nothing, null, wrong, GIVEN) is nothing
+    assert not wrong.is_beyond_chance
+    assert not is_beyond_prior(wrong, GIVEN, null)
 
 
 def test_columns_go_where_the_predictor_goes(predictor):

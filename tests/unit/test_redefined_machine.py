@@ -15,6 +15,7 @@ from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.redefined_machine import with_definition_put_right
 from spindle_fem.inference.structural_misdescriptions import StructuralChange
+from spindle_fem.inference.verdict import Judgement
 from spindle_fem.inference.wrong_definition import (
     WIDER,
     Redefined,
@@ -53,22 +54,29 @@ def fit_of(item, value, width=0.02):
     )
 
 
-def diagnosis_of(item, value, verdict="parameter", candidates=()):
-    """What a fit to first order says of a machine whose iron conducts TRUE."""
-
-    return SimpleDiagnosis(
-        final=fit_of(item, value),
-        wrong=WrongDirection(item, None, 20.0, 1e-6, within="as given"),
-        judgement=SimpleNamespace(
-            verdict=verdict, chosen=SimpleNamespace(fit=SimpleNamespace(candidates=candidates))
-        ),
-    )
-
-
-class SimpleDiagnosis(SimpleNamespace):
-    """With what :func:`dataclasses.replace` needs."""
+class Found(SimpleNamespace):
+    """A diagnosis, as far as it is looked at."""
 
     unchanged, null, explanations, notes = "of this machine", "of this fit", "of this heat", ()
+    coarseness = 1.0
+
+
+def suspected(item, value, **more):
+    return WrongDirection(item, None, value, 20.0, -5.0, 1e-6, **more)
+
+
+def diagnosis_of(item, value, verdict="consistent", gain=20.0, **more):
+    """What a fit to first order says of a machine whose iron conducts TRUE."""
+    fit = fit_of(item, value)
+    judgement = Judgement(verdict, 0.5, SimpleNamespace(fit=fit), (), 0.0, "")
+    calibrated = SimpleNamespace(fit=fit if more.get("by_calibration") else None)
+    return Found(
+        final=fit,
+        suspected=suspected(item, value, **more),
+        judgement=judgement,
+        calibrated=calibrated,
+        hypotheses=gain,
+    )
 
 
 @pytest.fixture
@@ -88,6 +96,9 @@ def machines_made(monkeypatch):
 
     monkeypatch.setattr(redefined_machine, "with_definition", with_definition)
     monkeypatch.setattr(redefined_machine, "replace", changed)
+    monkeypatch.setattr(
+        redefined_machine, "log_odds", lambda one, other, prior, coarseness: one - other + prior
+    )
     return made
 
 
@@ -116,7 +127,7 @@ def test_how_far_a_machine_is_from_its_definition_counts_from_the_given_one(spec
 
 
 def test_what_was_put_right_stays_open_as_widely_as_a_wrong_definition(spec):
-    wrong = WrongDirection(CONDUCTS, None, 20.0, 1e-6)
+    wrong = suspected(CONDUCTS, 0.9)
     wider, other = open_directions((CONDUCTS, DEEPER), Redefined(spec, wrong))
     assert wider.sigma == pytest.approx(WIDER * CONDUCTS.sigma)
     assert other is DEEPER
@@ -131,38 +142,54 @@ def test_a_machine_is_made_anew_until_its_recordings_ask_for_no_other_value(spec
         own = machine.spec.materials["cast_iron"].thermal_conductivity
         return diagnosis_of(CONDUCTS, 0.5 * np.log(TRUE / own))
 
-    machine, found = with_definition_put_right(given, seen(given), seen)
+    first = seen(given)
+    first.hypotheses, first.unchanged, first.null = 0.0, "as given", "fit as given"
+    machine, found = with_definition_put_right(given, first, seen)
     values = [item.materials["cast_iron"].thermal_conductivity for item in machines_made]
     assert len(values) == redefined_machine.MOST_TIMES
     assert values == sorted(values)
     assert machine.spec is machines_made[-1]
     assert machine.given is given.spec
-    assert defined_number(
-        CONDUCTS, machine.spec, found.final.values[CONDUCTS.coordinate]
-    ).value == pytest.approx(TRUE, rel=0.1)
-    assert (found.unchanged, found.null) == ("of this machine", "as given")
+    value = defined_number(CONDUCTS, machine.spec, found.final.values[CONDUCTS.coordinate]).value
+    assert value == pytest.approx(TRUE, rel=0.1)
+    assert (found.unchanged, found.null) == ("as given", "fit as given")
+    assert found.wrong is first.suspected
+    assert found.judgement.verdict == "parameter"
+    assert f"it says 22 W/(m·K), the recording {value:.3g} W/(m·K)" in found.judgement.reason
 
 
-@pytest.mark.parametrize(("verdict", "candidates"), [("consistent", ()), ("missing_physics", ("heat",))])
-def test_a_machine_stays_as_it_is_where_another_value_is_not_what_is_wrong(
-    spec, machines_made, verdict, candidates
-):
-    given, first = opened(spec), diagnosis_of(CONDUCTS, 0.9, "missing_physics", ("heat",))
+def test_a_wrong_definition_beside_physics_is_a_note(spec, machines_made):
+    first = diagnosis_of(CONDUCTS, 0.9, "missing_physics", gain=0.0)
+    _, found = with_definition_put_right(
+        opened(spec), first, lambda machine: diagnosis_of(CONDUCTS, 0.0, "missing_physics")
+    )
+    assert found.judgement.verdict == "missing_physics"
+    assert found.notes[0].startswith("The definition is off at key: it says")
+
+
+def test_what_a_calibration_says_needs_no_odds_and_leaves_the_verdict(spec, machines_made):
+    first = diagnosis_of(CONDUCTS, 0.9, by_calibration=True)
+    again = diagnosis_of(CONDUCTS, 0.0, by_calibration=True)
+    _, found = with_definition_put_right(opened(spec), first, lambda machine: again)
+    assert found.judgement.verdict == "consistent"
+    assert "the calibration" in found.notes[0]
+
+
+@pytest.mark.parametrize(("value", "gain"), [(0.0, 7.9), (-0.9, 20.0)])
+def test_a_machine_stays_as_it_is_where_another_value_tells_no_more(spec, machines_made, value, gain):
+    """By its odds, or as the machine made anew goes back to what was given."""
+    given, first = opened(spec), diagnosis_of(CONDUCTS, 0.9, "missing_physics", gain=0.0)
     machine, found = with_definition_put_right(
-        given, first, lambda machine: diagnosis_of(CONDUCTS, 0.0, verdict, candidates)
+        given, first, lambda machine: diagnosis_of(CONDUCTS, value, gain=gain)
     )
     assert machine is given
     assert found is first
     assert len(machines_made) == 1
 
 
-def test_nothing_is_made_anew_within_a_prior_or_where_no_key_has_a_number(spec, machines_made):
-    shape = replace(CONDUCTS, change=SpeedShape(("F1",), (0.0, 1.0), (1.0, 1.0)))
-    for item, value in ((CONDUCTS, 0.1), (shape, 0.9)):
-        first = diagnosis_of(item, value)
-        assert with_definition_put_right(opened(spec), first, None)[1] is first
+def test_nothing_is_made_anew_where_nothing_is_suspected(spec, machines_made):
     nothing = diagnosis_of(CONDUCTS, 0.9)
-    nothing.wrong = None
+    nothing.suspected = None
     assert with_definition_put_right(opened(spec), nothing, None)[1] is nothing
     assert not machines_made
 
