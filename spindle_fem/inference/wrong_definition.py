@@ -191,9 +191,6 @@ def suspected_of_calibration(
 
     Nothing is missing there, so that no effect could explain it instead.
     """
-    far = {c.name for c, u in zip(fit.coordinates, fit.position, strict=True) if abs(u) > PRIOR_SIGMAS}
-    if not any(i.coordinate in far and defined_number(i, spec) is not None for i in directions):
-        return None
     wrong = wrong_direction(problem, fit, directions, 0)
     if wrong is None or not wrong.is_beyond_chance or defined_number(wrong.direction, spec) is None:
         return None
@@ -257,11 +254,8 @@ def wrong_definition_words(wrong: WrongDirection, machine: DiagnosedMachine, fit
 def with_wrong_definition(
     judgement: Judgement, wrong: WrongDirection, machine: DiagnosedMachine
 ) -> Judgement:
-    """A judgement with a parameter that is off, by its definition.
-
-    Unless physics is missing beside it, or the calibration says so, against which the recording was held.
-    """
-    if wrong.by_calibration or judgement.verdict not in ("consistent", "sensor"):
+    """A judgement with a parameter that is off, by its definition, unless physics is missing beside it."""
+    if judgement.verdict not in ("consistent", "sensor"):
         return judgement
     words = wrong_definition_words(wrong, machine, judgement.chosen.fit)
     reason = "; ".join(filter(None, (words, judgement.reason)))

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from spindle_fem.commands.diagnose_command import diagnose_without_report
+from spindle_fem.definition.load import load_machine
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "spindle_examples"
 CASES = sorted(path.name for path in EXAMPLES.glob("example_*") if path.is_dir())
@@ -18,7 +19,7 @@ pytestmark = [
 ]
 
 
-def diagnosed(name, folder):
+def diagnosed(name, folder, *overrides):
     case = EXAMPLES / name
     earlier = case / "calibration.toml"
     return diagnose_without_report(
@@ -26,7 +27,7 @@ def diagnosed(name, folder):
         [case / "recording.toml"],
         folder,
         [earlier] if earlier.exists() else (),
-        ("mesh.preset=coarse",),
+        ("mesh.preset=coarse", *overrides),
         full_model="off",
     )
 
@@ -73,3 +74,27 @@ def test_an_example_is_answered_right(name, tmp_path):
         assert errors["after"]["heldout_rmse_K"] < errors["before"]["heldout_rmse_K"]
     else:
         assert errors["after"] == errors["before"]
+
+
+@pytest.mark.parametrize(
+    ("name", "verdict"),
+    [("example_1_consistent", ("parameter", "consistent")), ("example_6_gap_closure", ("missing_physics",))],
+)
+def test_a_number_of_the_definition_that_is_wrong_is_told_with_what_is_missing_beside_it(
+    name, verdict, tmp_path
+):
+    """The recordings are of a machine whose cast iron conducts 50 W/(m·K)."""
+    answer = json.loads((EXAMPLES / "answers" / f"{name}.json").read_text(encoding="utf-8"))
+    content = diagnosed(name, tmp_path / "out", "materials.cast_iron.thermal_conductivity=25W/m/K")
+    assert content["verdict"] in verdict
+    if answer["effects"]:
+        assert any(is_acceptable(content["findings"], item) for item in answer["acceptable_sets"])
+    wrong = content["misdescription"]["wrong"]
+    assert wrong["key"] == "materials.cast_iron.thermal_conductivity"
+    assert wrong["defined"]["given"] == 25.0
+    assert wrong["defined"]["low"] < 50.0 < wrong["defined"]["high"]
+    assert wrong["defined"]["value"] == pytest.approx(50.0, rel=TOLERANCE)
+    assert content["fit"]["after"]["heldout_rmse_K"] < content["fit"]["before"]["heldout_rmse_K"]
+    improved = load_machine(tmp_path / "out" / "improved_machine.toml")
+    conductivity = improved.materials["cast_iron"].thermal_conductivity
+    assert conductivity == pytest.approx(wrong["defined"]["value"], rel=0.05)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.definition.load import load_machine, write_machine
+from spindle_fem.effects.framework.effect import Reported
 from spindle_fem.effects.framework.filters import first_order_lag
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import Coordinate
@@ -286,10 +287,9 @@ def test_a_definition_far_off_in_one_direction_is_found_there(off_at):
     assert judged.verdict == "parameter"
     assert "heat.table" in judged.reason
     assert judged.p_value < 0.01
-    # beside physics that is missing, or by the calibration, the verdict is that of the recording
+    # beside physics that is missing
     physics = replace(nothing, verdict="missing_physics")
     assert with_wrong_definition(physics, wrong, GIVEN) is physics
-    assert with_wrong_definition(nothing, replace(wrong, by_calibration=True), GIVEN) is nothing
     lying = replace(nothing, verdict="sensor", reason="a sensor lies")
     assert with_wrong_definition(lying, wrong, GIVEN).reason.endswith("; a sensor lies")
 
@@ -308,6 +308,27 @@ def test_a_direction_is_suspected_where_it_explains_more_than_any_set(case, off_
     assert suspected(nothing, replace(other, log_prior=-100.0)).direction.name == "F1"
     # no number of a definition could be tried, by a calibration or beside effects
     assert suspected_of_calibration(problem, null, directions, None) is None
+    beside = Hypothesis(problem.fit((case.candidates["sensor_offset", "SP05"],)), 0.0)
+    unlikely = replace(nothing, log_prior=-1000.0)
+    assert suspected(unlikely, beside) is None
+    numbers = [replace(i, change=Number(FRONT[:1], *ALWAYS)) if i.name == "F1" else i for i in directions]
+    for found in (
+        suspected_of_calibration(problem, null, numbers, None),
+        suspected_direction(problem, [unlikely, beside], numbers, 100, 1.0, None),
+    ):
+        assert found.direction.name == "F1"
+        assert found.value == pytest.approx(0.55, abs=0.1)
+        assert found.is_beyond_chance
+
+
+class Number(SpeedShape):
+    """A change of what a definition has as one number."""
+
+    def quantity(self, spec):
+        return Reported(1.0, "")
+
+    def redefined(self, spec, value):
+        return spec
 
 
 def counted(problem, null, refitted, wrong, trials=100):

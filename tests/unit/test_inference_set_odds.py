@@ -7,7 +7,7 @@ import pytest
 
 from spindle_fem.inference import tuned
 from spindle_fem.inference.p_value import detection_p_value, heldout_p_value
-from spindle_fem.inference.set_odds import any_magnitude, counted, rank, tempered
+from spindle_fem.inference.set_odds import any_magnitude, counted, log_odds, rank, tempered
 from tests.support.made_hypotheses import (
     AS_NORMAL,
     CHURNING,
@@ -27,6 +27,14 @@ def test_probabilities_of_sets_add_up_over_their_forms():
     assert ranked[0].fit.keys == {("thermal_preload", "front_bearings", None)}
     assert sum(item.probability for item in ranked) == pytest.approx(1.0)
     assert [item.probability for item in ranked] == sorted((i.probability for i in ranked), reverse=True)
+
+
+def test_odds_of_one_machine_over_another_are_those_of_all_their_sets():
+    given = [hypothesis(misfit=420.0, evidence=-1e4), hypothesis(PRELOAD, misfit=400.0)]
+    other = [hypothesis(misfit=420.0, evidence=-1e4), hypothesis(PRELOAD, misfit=394.0)]
+    assert log_odds(given, given, 0.0) == pytest.approx(0.0)
+    assert log_odds(other, given, -2.0) == pytest.approx(3.0 / tuned.GAIN_DIVISOR - 2.0)
+    assert log_odds(given, other, 2.0) == pytest.approx(-log_odds(other, given, -2.0))
 
 
 def test_the_better_form_speaks_for_its_set():

@@ -167,12 +167,12 @@ def test_a_wrong_definition_beside_physics_is_a_note(spec, machines_made):
     assert found.notes[0].startswith("The definition is off at key: it says")
 
 
-def test_what_a_calibration_says_needs_no_odds_and_leaves_the_verdict(spec, machines_made):
+def test_what_a_calibration_says_needs_no_odds(spec, machines_made):
     first = diagnosis_of(CONDUCTS, 0.9, by_calibration=True)
     again = diagnosis_of(CONDUCTS, 0.0, by_calibration=True)
     _, found = with_definition_put_right(opened(spec), first, lambda machine: again)
-    assert found.judgement.verdict == "consistent"
-    assert "the calibration" in found.notes[0]
+    assert found.judgement.verdict == "parameter"
+    assert "the calibration" in found.judgement.reason
 
 
 @pytest.mark.parametrize(("value", "gain"), [(0.0, 7.9), (-0.9, 20.0)])
