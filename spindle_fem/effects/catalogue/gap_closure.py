@@ -18,6 +18,9 @@ OVER_HOUSING, OVER_START = "ring over housing", "ring over start"
 # the housing, but tens over its own start, or a wall over the air.
 CLOSED_OVER_HOUSING, CLOSED_OVER_START = (2.0, 4.0, 8.0, 15.0), (4.0, 8.0, 15.0)
 WIDTH_OVER_HOUSING = 0.5
+# Lags at which fits begin there, s: a gap that closes at once and one that follows the ring's mean slowly are
+# two answers of one fit, which ends at the one near which it begins.
+LAGS_OVER_HOUSING = (600.0, 120.0)
 
 
 class GapClosureTerm(Term):
@@ -130,7 +133,11 @@ class GapClosure(Effect):
     @staticmethod
     def _starts(over_housing: bool) -> list[dict[str, float]]:
         if over_housing:
-            return [{"closing_difference": k, "width": WIDTH_OVER_HOUSING * k} for k in CLOSED_OVER_HOUSING]
+            return [
+                {"closing_difference": k, "width": WIDTH_OVER_HOUSING * k, "lag": lag}
+                for lag in LAGS_OVER_HOUSING
+                for k in CLOSED_OVER_HOUSING
+            ]
         return [{"closing_difference": k} for k in CLOSED_OVER_START]
 
     @staticmethod
