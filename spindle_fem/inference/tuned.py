@@ -129,7 +129,8 @@ SINGLES_FITTED, PAIRS_FITTED, TRIPLES_FITTED = (8, 5), 6, 3
 # was 38 s off was taken for a lateness of 2.1. Of seed 541 each machine has 0.4 so far off, 0.6 beyond 1.5.)
 FAR_OFF = 2.0
 # This many singles are fitted whatever they promise; others need this gain, and this share of the best's.
-SINGLES_ALWAYS_FITTED, LEAST_PROMISED_GAIN, LEAST_PROMISED_SHARE = 4, 4.0, 0.35
+# (First order knows little of a gap that closes: one promised 0.30 of the best, and fitted was the best.)
+SINGLES_ALWAYS_FITTED, LEAST_PROMISED_GAIN, LEAST_PROMISED_SHARE = 4, 4.0, 0.25
 # By how much less that may be beside the best set: small ones gain 5 to 8 more there, fitted, than promised.
 PROMISED_SHORT = 7.0
 # Hypotheses that are extended by an effect, and additions fitted to each.
