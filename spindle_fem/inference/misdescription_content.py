@@ -63,8 +63,9 @@ def _wrong_row(
     row = _row(predictor, fit, item, fit.stated_sigmas)
     fitted = {key: row[key] for key in ("value", "low", "high")}
     beyond = {key: departure(item, machine, value) for key, value in fitted.items()}
-    if fitted["value"]:
-        row["largest_K"] *= abs(beyond["value"] / fitted["value"])
+    for key in ("largest_K", "largest_um"):
+        if key in row and fitted["value"]:
+            row[key] *= abs(beyond["value"] / fitted["value"])
     row |= beyond | {"sigmas": beyond["value"] / item.sigma}
     before = defined_number(item, machine.given)
     if before is not None:
