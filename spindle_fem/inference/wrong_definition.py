@@ -257,8 +257,9 @@ def with_wrong_definition(
     """A judgement with a parameter that is off, by its definition, unless physics is missing beside it."""
     if judgement.verdict not in ("consistent", "sensor"):
         return judgement
-    words = wrong_definition_words(wrong, machine, judgement.chosen.fit)
-    reason = "; ".join(filter(None, (words, judgement.reason)))
+    reason = judgement.reason
+    if judgement.verdict == "consistent":
+        reason = wrong_definition_words(wrong, machine, judgement.chosen.fit)
     return replace(
         judgement, verdict="parameter", p_value=min(judgement.p_value, wrong.p_value), reason=reason
     )

@@ -52,7 +52,7 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
             for item in content["alternatives"]
             if item["probability"] >= tuned.LISTED
         ]
-        return off + (
+        return (
             f"The recording agrees with the machine: what differs, {kelvin(fit['after']['heldout_rmse_K'])} "
             f"on held-out readings, is noise ({kelvin(fit['noise_K'])}), the slow error allowed to sensors "
             f"and model ({kelvin(content['slow_error']['sigma_K'])}) and what the uncertain parameters "
@@ -83,7 +83,7 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         return off + _improvement(fit)
     statements = " ".join(item["statement"] for item in content["findings"])
     lead = "" if verdict == "sensor" else _heat_words(content)
-    doubt = "" if off else str(content.get("reason") or "").rstrip(".")
+    doubt = str(content.get("reason") or "").rstrip(".")
     sure = f"Probability {chance(content.get('set_probability'))}.{f' {capital(doubt)}.' if doubt else ''}"
     return f"{lead}{statements} {sure} {off}{_improvement(fit)}"
 

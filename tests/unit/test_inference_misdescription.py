@@ -291,7 +291,8 @@ def test_a_definition_far_off_in_one_direction_is_found_there(off_at):
     physics = replace(nothing, verdict="missing_physics")
     assert with_wrong_definition(physics, wrong, GIVEN) is physics
     lying = replace(nothing, verdict="sensor", reason="a sensor lies")
-    assert with_wrong_definition(lying, wrong, GIVEN).reason.endswith("; a sensor lies")
+    beside = with_wrong_definition(lying, wrong, GIVEN)
+    assert (beside.verdict, beside.reason) == ("parameter", "a sensor lies")
 
 
 def test_a_direction_is_suspected_where_it_explains_more_than_any_set(case, off_at):
@@ -418,6 +419,12 @@ def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
     number = {"given": 22.0, "value": 47.5, "low": 42.0, "high": 53.9, "unit": "W/(m·K)"}
     by_key = whole | {"misdescription": content | {"wrong": told | {"defined": number}}}
     assert "off at heat.table: 47.5 W/(m·K) (42 to 53.9), where it says 22." in verdict_sentence(by_key)
+    # a doubt about what is found beside it is said as well
+    found = {"verdict": "sensor", "findings": [{"statement": "A sensor lies."}], "reason": "much is left"}
+    sentence = verdict_sentence(by_key | found)
+    assert "A sensor lies." in sentence
+    assert "Much is left." in sentence
+    assert "off at heat.table" in sentence
     table, text = misdescription_blocks(whole)
     assert "heat of F1" in table.rows[0]["cells"]
     assert "heat.table" in text.text
