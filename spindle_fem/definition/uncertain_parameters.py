@@ -24,6 +24,8 @@ class UncertainParameter:
         ``heat.front``, ``coolant.film_factor``), or the shared factor's name.
     applies_to : tuple of str
         The coefficients that it multiplies, as ``[[factor]]`` names them.
+    keys : tuple of str
+        Of those in the definition, as ``--set`` takes them.
     value : float
         Nominal value in ``unit``; 1 for a factor.
     unit : str
@@ -34,6 +36,7 @@ class UncertainParameter:
 
     name: str
     applies_to: tuple[str, ...]
+    keys: tuple[str, ...]
     value: float
     unit: str
     sigma_log: float
@@ -44,6 +47,7 @@ class _Coefficient:
     """A place in the machine that holds an uncertain value."""
 
     name: str
+    key: str
     amount: Uncertain
     unit: str
     replaced: Callable[[MachineSpec, Uncertain], MachineSpec]
@@ -77,10 +81,12 @@ def _ball_row(table: BearingSet, amount: Uncertain) -> BearingSet:
 
 
 def _coefficients(spec: MachineSpec) -> Iterator[_Coefficient]:
-    yield _Coefficient("heat_capacity_factor", spec.heat_capacity_factor, "", _field("heat_capacity_factor"))
+    own = "heat_capacity_factor"
+    yield _Coefficient(own, own, spec.heat_capacity_factor, "", _field(own))
     for index, group in enumerate(spec.bearing_set):
         yield _Coefficient(
             f"heat.{group.name}",
+            f"bearing_set.{group.name}.heat_factor",
             group.heat_factor,
             "",
             _changed_entry("bearing_set", index, _field("heat_factor")),
@@ -88,19 +94,21 @@ def _coefficients(spec: MachineSpec) -> Iterator[_Coefficient]:
         if group.ball_row.conductance is not None:
             yield _Coefficient(
                 f"ball_row.{group.name}",
+                f"bearing_set.{group.name}.ball_row.conductance",
                 group.ball_row.conductance,
                 "W/K",
                 _changed_entry("bearing_set", index, _ball_row),
             )
     if spec.coolant is not None:
-        yield _Coefficient(
-            "coolant.film_factor", spec.coolant.film_factor, "", _changed_table("coolant", "film_factor")
-        )
-    yield _Coefficient("heat.inner_share", spec.heat.inner_share, "", _changed_table("heat", "inner_share"))
+        own = "coolant.film_factor"
+        yield _Coefficient(own, own, spec.coolant.film_factor, "", _changed_table("coolant", "film_factor"))
+    own = "heat.inner_share"
+    yield _Coefficient(own, own, spec.heat.inner_share, "", _changed_table("heat", "inner_share"))
     for index, joint in enumerate(spec.joint):
         if isinstance(joint, JointGroup) and isinstance(joint.conductance, Uncertain):
             yield _Coefficient(
                 f"joint.{joint.name}",
+                f"joint.{joint.name}.conductance",
                 joint.conductance,
                 "W/m**2/K",
                 _changed_entry("joint", index, _field("conductance")),
@@ -108,14 +116,18 @@ def _coefficients(spec: MachineSpec) -> Iterator[_Coefficient]:
     for index, film in enumerate(spec.film):
         constant = isinstance(film, ConstantFilm)
         key = "coefficient" if constant else "factor"
+        name = f"film.{film.name}" if film.name else f"film[{index + 1}]"
         yield _Coefficient(
-            f"film.{film.name}" if film.name else f"film[{index + 1}]",
+            name,
+            f"{name}.{key}",
             getattr(film, key),
             "W/m**2/K" if constant else "",
             _changed_entry("film", index, _field(key)),
         )
     for index, gap in enumerate(spec.gap):
-        yield _Coefficient(f"gap.{gap.name}", gap.factor, "", _changed_entry("gap", index, _field("factor")))
+        name = f"gap.{gap.name}"
+        changed = _changed_entry("gap", index, _field("factor"))
+        yield _Coefficient(name, f"{name}.factor", gap.factor, "", changed)
 
 
 def uncertain_parameters(spec: MachineSpec) -> tuple[UncertainParameter, ...]:
@@ -128,16 +140,32 @@ def uncertain_parameters(spec: MachineSpec) -> tuple[UncertainParameter, ...]:
     >>> [parameter.name for parameter in uncertain_parameters(load_machine("recorded_spindle"))][:3]
     ['heat_capacity_factor', 'heat.front', 'heat.rear']
     """
+    coefficients = {item.name: item for item in _coefficients(spec)}
     inline = [
-        UncertainParameter(item.name, (item.name,), item.amount.value, item.unit, item.amount.sigma_log)
-        for item in _coefficients(spec)
+        UncertainParameter(
+            item.name, (item.name,), (item.key,), item.amount.value, item.unit, item.amount.sigma_log
+        )
+        for item in coefficients.values()
         if not item.amount.is_fixed
     ]
     shared = [
-        UncertainParameter(factor.name, factor.applies_to, 1.0, "", factor.sigma_rel)
-        for factor in spec.factor
+        UncertainParameter(
+            item.name,
+            item.applies_to,
+            tuple(coefficients[name].key for name in item.applies_to),
+            1.0,
+            "",
+            item.sigma_rel,
+        )
+        for item in spec.factor
     ]
     return tuple(inline + shared)
+
+
+def coefficient_value(spec: MachineSpec, name: str) -> tuple[float, str]:
+    """Value of a coefficient, as a parameter's ``applies_to`` names it, and its SI unit."""
+    found = next(item for item in _coefficients(spec) if item.name == name)
+    return found.amount.value, found.unit
 
 
 def with_parameters(spec: MachineSpec, factors: Mapping[str, float]) -> MachineSpec:

@@ -41,13 +41,14 @@ from spindle_fem.inference.search_basis import acted_on, on_smaller_bases, small
 from spindle_fem.inference.search_course import run_search
 from spindle_fem.inference.set_odds import rank
 from spindle_fem.inference.set_problems import SetProblems, combination_of
+from spindle_fem.inference.uncertain_numbers import uncertain_numbers
 from spindle_fem.inference.verdict import Judgement, judge
 from spindle_fem.inference.worker_processes import Workers
 from spindle_fem.inference.wrong_definition import (
     WrongDirection,
     defined_number,
     is_beyond_prior,
-    open_directions,
+    known_of,
     suspected_direction,
     suspected_of_calibration,
     with_wrong_definition,
@@ -83,7 +84,7 @@ class Diagnosis:
     heldout : str
         How the held-out readings were chosen.
     seconds : mapping of stage to float
-    wrong : WrongDirection or None
+    wrong : tuple of WrongDirection
         Where the definition is wrong.
     suspected : WrongDirection or None
         A number of it that is to be tried by making the machine anew.
@@ -105,7 +106,7 @@ class Diagnosis:
     heldout: str
     candidates_tried: int
     seconds: Mapping[str, float]
-    wrong: WrongDirection | None = None
+    wrong: tuple[WrongDirection, ...] = ()
     suspected: WrongDirection | None = None
     followed: Followed | None = None
     notes: tuple[str, ...] = ()
@@ -175,7 +176,7 @@ def diagnose_recordings(
     earlier = None
     if calibration:
         earlier = Predictor(fast, calibration, effects=machine.effects).with_unseen(unseen)
-    directions = open_directions(misdescriptions_of(predictor), machine.redefined)
+    directions = misdescriptions_of(predictor)
     candidates = candidates_for(view, len(recordings))
     places = sorted(acted_on(predictor, view, candidates))
     calibrating = workers.ahead(partial(_calibrated, earlier, predictor, directions, places, machine))
@@ -210,10 +211,14 @@ def diagnose_recordings(
     trials = len({(c.effect, c.component) for c in candidates})
     empty = next(h for h in found if not h.fit.candidates)
     wrong, belief = calibrated.suspected, calibrated.known
-    if machine.redefined is not None:
-        wrong = None
-    elif wrong is None:
-        wrong = suspected_direction(problem, found, directions, trials, coarseness, machine.spec)
+    if wrong is None and machine.redefined is None:
+        # A parameter that an effect shifts is told by that effect.
+        shifted = {factor.name for c in candidates if c.shift_of_prior for factor in c.factors}
+        numbers = () if machine.is_network else uncertain_numbers(machine.spec)
+        unshifted = [item for item in numbers if item.name not in shifted]
+        wrong = suspected_direction(
+            problem, found, (*directions, *unshifted), trials, coarseness, machine.spec
+        )
     # What is a number of the definition is tried by making the machine anew.
     freed = wrong is not None and defined_number(wrong.direction, machine.spec) is None
     if freed:
@@ -270,7 +275,7 @@ def diagnose_recordings(
         coarseness=coarseness,
     )
     null = next(h for h in refitted if not h.fit.candidates)
-    before, told = null.fit, None
+    before, told = null.fit, ()
     if freed and judgement.verdict == "consistent":
         as_known = Problem(problems.plain.predictor, calibrated.known, slow, predictor.observations)
         within = as_known.fit((), null.fit.values)
@@ -278,9 +283,10 @@ def diagnose_recordings(
             gain = 0.5 * (readings.heldout_misfit(within) - null.heldout)
             wrong = replace(wrong, told=gain / (coarseness * tuned.GAIN_DIVISOR))
         if wrong.is_beyond_chance and is_beyond_prior(wrong, machine, null.fit):
-            judgement = with_wrong_definition(judgement, wrong, machine)
+            told = (wrong,)
+            judgement = with_wrong_definition(judgement, told, machine)
             # Without it, and where heat is missing then.
-            before, told, problem = within, wrong, replace(problem, belief=calibrated.known)
+            before, problem = within, replace(problem, belief=calibrated.known)
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit
     about_chosen = problems.of(chosen_fit)
@@ -337,13 +343,14 @@ def _calibrated(
 
     ``places`` are those where something may act: what is not exact of the machine acts there too.
     """
-    suspect = partial(suspected_of_calibration, directions=directions, spec=machine.spec)
+    suspect = partial(suspected_of_calibration, directions=directions, machine=machine)
     if earlier is not None:
-        found = open_directions(misdescriptions_of(earlier), machine.redefined)
+        found = misdescriptions_of(earlier)
         if not earlier.is_network:
             _, earlier = on_smaller_bases(earlier, [prior.name for prior in earlier.uncertain()], places)
         earlier = with_misdescriptions(earlier, found)
-    return calibrate(earlier, predictor.misdescribed_by(directions, {}), suspect)
+    known = partial(known_of, redefined=machine.redefined)
+    return calibrate(earlier, predictor.misdescribed_by(directions, {}), suspect, known)
 
 
 def overlapping_components(view: MachineView) -> dict[str, frozenset[str]]:

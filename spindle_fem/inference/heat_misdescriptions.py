@@ -99,8 +99,7 @@ class Conductivity:
 
     def corrected(self, spec: MachineSpec, value: float) -> MachineSpec:
         """The machine with the conductivity that it has."""
-        own = spec.materials[self.material]
-        return self._with(spec, own.thermal_conductivity * (1.0 + value))
+        return with_material(spec, self.material, "thermal_conductivity", 1.0 + value)
 
     def quantity(self, spec: MachineSpec) -> Reported:
         """Its conductivity."""
@@ -112,11 +111,14 @@ class Conductivity:
         To first order a share adds conductance where paths are in parallel and takes resistance where they
         are in series; the exponential lies between.
         """
-        return self._with(spec, spec.materials[self.material].thermal_conductivity * float(np.exp(value)))
+        return with_material(spec, self.material, "thermal_conductivity", float(np.exp(value)))
 
-    def _with(self, spec: MachineSpec, conductivity: float) -> MachineSpec:
-        changed = spec.materials[self.material].model_copy(update={"thermal_conductivity": conductivity})
-        return spec.model_copy(update={"materials": {**spec.materials, self.material: changed}})
+
+def with_material(spec: MachineSpec, material: str, key: str, factor: float) -> MachineSpec:
+    """The machine with one property of a material changed by a factor."""
+    own = spec.materials[material]
+    changed = own.model_copy(update={key: factor * getattr(own, key)})
+    return spec.model_copy(update={"materials": {**spec.materials, material: changed}})
 
 
 def _more(base: BaseRun, coefficients: Sequence[str], start: Array | float, end: Array | float) -> Change:

@@ -100,6 +100,14 @@ class Misdescription:
             return MISDESCRIBED_PREFIX + self.name
         return f"{MISDESCRIBED_IN_PREFIX}{self.recording}.{self.name}"
 
+    def amount(self, fitted: float) -> float:
+        """How far it goes where a fit has its coordinate at a value."""
+        return fitted
+
+    def between(self, given: float, found: float) -> float:
+        """How far a number of the definition goes from one value to another, as the prior's width counts."""
+        return found - given if self.unit else found / given - 1.0
+
 
 def delays_in(number: int, directions: Sequence[Misdescription]) -> dict[str, str]:
     """Of each direction that is a delay in a recording its coordinate, and the channel that it makes late."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from spindle_fem.inference.hypothesis_fit import Fit
 from spindle_fem.inference.misdescription import EVERY_CHANNEL, Misdescription
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.uncertain_numbers import UncertainNumber
 from spindle_fem.inference.wrong_definition import defined_number, departure
 from spindle_fem.units import NORMAL_90_PERCENT
 
@@ -37,20 +39,20 @@ def misdescription_content(diagnosis: Diagnosis, machine: DiagnosedMachine) -> d
     """
     final, null = (diagnosis.predictor, diagnosis.stated_fit), (diagnosis.unchanged, diagnosis.null)
     found = bool(diagnosis.final.candidates)
-    wrong = None
-    if diagnosis.wrong is not None:
-        wrong = _wrong_row(*final, diagnosis.wrong.direction, machine)
+    wrong = [_wrong_row(*final, item.direction, machine) for item in diagnosis.wrong]
+    wrong.sort(key=lambda row: -abs(row["sigmas"]))
     return {
         "directions": len(diagnosis.predictor.misdescribed),
         "left_open": _rows(*final, wrong),
         "instead": _rows(*null) if found else [],
         "measure": _to_measure(*(null if found else final), wrong),
-        "wrong": wrong,
+        "wrong": wrong[0] if wrong else None,
+        "also_wrong": wrong[1:],
     }
 
 
-def _rows(predictor: Predictor, fit: Fit, wrong: dict[str, Any] | None = None) -> list[dict[str, Any]]:
-    sigmas, known = fit.stated_sigmas, {} if wrong is None else {wrong["name"]: wrong}
+def _rows(predictor: Predictor, fit: Fit, wrong: Sequence[dict[str, Any]] = ()) -> list[dict[str, Any]]:
+    sigmas, known = fit.stated_sigmas, {row["name"]: row for row in wrong}
     rows = [known.get(item.name) or _row(predictor, fit, item, sigmas) for item in predictor.misdescribed]
     moved = [row for row in rows if abs(row["sigmas"]) >= MOVED]
     return sorted(moved, key=lambda row: -abs(row["sigmas"]))[:MOST_LISTED]
@@ -78,11 +80,11 @@ def _wrong_row(
 def _row(predictor: Predictor, fit: Fit, item: Misdescription, sigmas: np.ndarray) -> dict[str, Any]:
     """One direction in one fit, whose standard deviations are stated as ``sigmas``."""
     late = _late_already(predictor, item)
-    value = fit.values[item.coordinate] + late
-    low, high = fit.interval(item.coordinate, NORMAL_90_PERCENT, sigmas)
+    fitted = (fit.values[item.coordinate], *fit.interval(item.coordinate, NORMAL_90_PERCENT, sigmas))
+    value, low, high = (item.amount(each) + late for each in fitted)
     largest, channel, swing, sensor = 0.0, "", 0.0, ""
     for number, recording in enumerate(predictor.recordings):
-        column = predictor.column_of(number, item.coordinate)
+        column = _column(predictor, fit, item, number)
         if column is not None:
             kelvins = recording.temperature_count
             moved = np.abs(value * column[:, :kelvins]).max(axis=0)
@@ -101,8 +103,8 @@ def _row(predictor: Predictor, fit: Fit, item: Misdescription, sigmas: np.ndarra
         "unit": item.unit,
         "prior_sigma": item.sigma,
         "value": value,
-        "low": low + late,
-        "high": high + late,
+        "low": low,
+        "high": high,
         "sigmas": value / item.sigma,
         "largest_K": largest,
         "channel": channel or sensor,
@@ -111,19 +113,29 @@ def _row(predictor: Predictor, fit: Fit, item: Misdescription, sigmas: np.ndarra
     }
 
 
+def _column(predictor: Predictor, fit: Fit, item: Misdescription, number: int) -> np.ndarray | None:
+    """What a direction changes of a recording's readings, (G + 1, c) per unit of it; None where nothing."""
+    if not isinstance(item, UncertainNumber):
+        return predictor.column_of(number, item.coordinate)
+    name = (item.coordinate,)
+    return predictor.predict(number, fit.values, fit.candidates, name).sensitivity[:, :, 0]
+
+
 def _late_already(predictor: Predictor, item: Misdescription) -> float:
     """By how much the clock of a recording was found to be off before the fit, s."""
     return float(predictor.late[item.recording]) if item.delays == EVERY_CHANNEL else 0.0
 
 
-def _to_measure(predictor: Predictor, fit: Fit, wrong: dict[str, Any] | None = None) -> dict[str, Any] | None:
+def _to_measure(
+    predictor: Predictor, fit: Fit, wrong: Sequence[dict[str, Any]] = ()
+) -> dict[str, Any] | None:
     """The direction that readings hold farthest off the definition, in widths of its posterior.
 
     That in which the definition is wrong, if it is. None where none lies more than one width off.
     """
-    if wrong is not None:
-        width = (wrong["high"] - wrong["low"]) / (2.0 * NORMAL_90_PERCENT)
-        return _measured(wrong, abs(wrong["value"]) / width)
+    if wrong:
+        width = (wrong[0]["high"] - wrong[0]["low"]) / (2.0 * NORMAL_90_PERCENT)
+        return _measured(wrong[0], abs(wrong[0]["value"]) / width)
     names = [c.name for c in fit.coordinates]
     best, most = None, 1.0
     for item in predictor.misdescribed:

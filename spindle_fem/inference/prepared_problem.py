@@ -281,6 +281,7 @@ def calibrate(
     earlier: Predictor | None,
     predictor: Predictor,
     suspect: Callable[[Problem, Fit], Any] = lambda problem, fit: None,
+    known: Callable[[Predictor], Belief] = known_before,
 ) -> Calibrated:
     """Fit calibration recordings; the prior where there are none.
 
@@ -292,13 +293,14 @@ def calibrate(
         On those to be diagnosed.
     suspect : callable
         Says what is suspicious of the fit to calibration recordings of a machine with geometry.
+    known : callable
+        Belief before any recording.
     """
-    shared, begun = machine_coordinates(predictor), start_coordinates(predictor)
+    belief = known(predictor)
     if earlier is None:
-        belief = known_before(predictor)
         return Calibrated(belief, belief, expected_slow_error(predictor), None)
     slow, fit, begin = expected_slow_error(earlier), None, None
-    prior = known_before(earlier)
+    prior, shared = known(earlier), belief.coordinates[: len(machine_coordinates(predictor))]
     for _ in range(CALIBRATION_ROUNDS):
         if fit is not None:
             # Directions are linearised about the fitted numbers.
@@ -311,7 +313,6 @@ def calibrate(
             break
     # Channels that only the diagnosed recordings have stay as they were known before.
     slow = _with_displacements_of(slow, predictor)
-    belief = known_before(predictor)
     place = {c.name: index for index, c in enumerate(fit.coordinates)}
     rows = [index for index, c in enumerate(shared) if c.name in place]
     fitted = [place[shared[index].name] for index in rows]
@@ -323,7 +324,7 @@ def calibrate(
     mean = belief.mean.copy()
     mean[rows] = fit.position[fitted]
     root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
-    after = Belief((*shared, *begun), mean, root)
+    after = Belief(belief.coordinates, mean, root)
     if not predictor.is_network:
         return Calibrated(after, after, slow, fit, suspect(problem, fit))
     problem = Problem(earlier, prior, slow, earlier.observations)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import capital
 from spindle_fem.errors import SpindleFemError
 from spindle_fem.inference import tuned
@@ -27,6 +28,8 @@ from spindle_fem.inference.wrong_definition import (
 
 # Times that a machine is made anew at most; nine wrong numbers that were tried took one or two.
 MOST_TIMES = 3
+# Wrong numbers of one definition at most: a material that is another one has two.
+MOST_NUMBERS = 3
 
 
 def with_definition_put_right(
@@ -52,28 +55,18 @@ def with_definition_put_right(
     (DiagnosedMachine, Diagnosis)
         ``unchanged``, ``null`` and ``explanations`` are those of the definition as it was given.
     """
-    wrong = diagnosis.suspected
-    if wrong is None:
-        return machine, diagnosis
-    item, opened, found, value = wrong.direction, machine, diagnosis, wrong.value
-    for _ in range(MOST_TIMES):
-        progress(f"definition put right: {item.key}")
-        try:
-            spec = item.change.redefined(opened.spec, value)
-            other = replace(with_definition(opened, spec, progress), redefined=Redefined(machine.spec, wrong))
-            again = diagnosed(other)
-        except SpindleFemError as error:
-            note = f"The machine could not be made anew with another {item.key}: {error}"
-            found = replace(found, notes=(*found.notes, note))
+    opened, found, told = machine, diagnosis, ()
+    while found.suspected is not None and len(told) < MOST_NUMBERS:
+        other, again = _followed(machine.spec, opened, found, (*told, found.suspected), diagnosed, progress)
+        if other is opened:
+            found = again
             break
-        if opened is machine and not _is_told(wrong, diagnosis, other, again):
-            break
+        told = (*told, found.suspected)
         opened, found = other, again
-        value, width = _fitted(_telling(wrong, found), item)
-        if abs(value) <= width:
-            break
-    if opened is machine:
-        return machine, found
+    # The first may have stood for one that was found after it.
+    wrong = tuple(item for item in told if is_beyond_prior(item, opened, _telling(item, found)))
+    if not wrong:
+        return machine, found if opened is machine else diagnosis
     judgement, notes = with_wrong_definition(found.judgement, wrong, opened), found.notes
     if found.judgement.verdict != "consistent":
         notes = (capital(wrong_definition_words(wrong, opened, found.final)), *notes)
@@ -86,6 +79,41 @@ def with_definition_put_right(
         null=diagnosis.null,
         explanations=diagnosis.explanations,
     )
+
+
+def _followed(
+    given: MachineSpec,
+    opened: DiagnosedMachine,
+    found: Diagnosis,
+    wrong: tuple[WrongDirection, ...],
+    diagnosed: Callable[[DiagnosedMachine], Diagnosis],
+    progress: Callable[[str], None],
+) -> tuple[DiagnosedMachine, Diagnosis]:
+    """The machine with the last of some wrong numbers followed too, and its diagnosis.
+
+    As they are where that number is not told, or no machine can be made with it.
+    """
+    last, before = wrong[-1], (opened, found)
+    values = [*(_fitted(_telling(item, found), item.direction)[0] for item in wrong[:-1]), last.value]
+    for _ in range(MOST_TIMES):
+        progress(f"definition put right: {', '.join(item.direction.key for item in wrong)}")
+        spec = opened.spec
+        try:
+            for item, value in zip(wrong, values, strict=True):
+                spec = item.direction.change.redefined(spec, value)
+            other = replace(with_definition(opened, spec, progress), redefined=Redefined(given, wrong))
+            again = diagnosed(other)
+        except SpindleFemError as error:
+            note = f"The machine could not be made anew with another {last.direction.key}: {error}"
+            return opened, replace(found, notes=(*found.notes, note))
+        if opened is before[0] and not _is_told(last, found, other, again):
+            return before
+        opened, found = other, again
+        fitted = [_fitted(_telling(item, found), item.direction) for item in wrong]
+        values = [value for value, _ in fitted]
+        if all(abs(value) <= width for value, width in fitted):
+            break
+    return opened, found
 
 
 def _is_told(wrong: WrongDirection, given: Diagnosis, other: DiagnosedMachine, again: Diagnosis) -> bool:
@@ -107,4 +135,4 @@ def _telling(wrong: WrongDirection, found: Diagnosis) -> Fit:
 def _fitted(fit: Fit, item: Misdescription) -> tuple[float, float]:
     """Value of a direction in a fit, and its standard deviation as stated."""
     low, high = fit.interval(item.coordinate, 1.0, fit.stated_sigmas)
-    return fit.values[item.coordinate], 0.5 * (high - low)
+    return item.amount(fit.values[item.coordinate]), 0.5 * (item.amount(high) - item.amount(low))

@@ -13,10 +13,11 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Reported
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import GAP_PREFIX, JUMP_PREFIX
+from spindle_fem.inference.heat_misdescriptions import with_material
 from spindle_fem.inference.misdescription import Change, Misdescription
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.model.reduced.fast_model import FastModel, ModelInputs
-from spindle_fem.model.reduced.structural_directions import with_channel
+from spindle_fem.model.reduced.structural_causes import CAPACITY, with_channel
 from spindle_fem.model.reduced.structural_model import StructuralModel, structural_model_of
 
 Array = NDArray[np.float64]
@@ -64,6 +65,31 @@ class StructuralChange:
         return with_channel(spec, {key: value * self.amount * each for key, each in self.channel})
 
 
+@dataclass(frozen=True, slots=True)
+class MaterialCapacity(StructuralChange):
+    """Change by another heat capacity of one material.
+
+    Attributes
+    ----------
+    material : str
+    """
+
+    material: str = ""
+
+    def corrected(self, spec: MachineSpec, value: float) -> MachineSpec:
+        """The machine with the capacity that it has."""
+        return with_material(spec, self.material, "specific_heat_capacity", 1.0 + value)
+
+    def quantity(self, spec: MachineSpec) -> Reported:
+        """Its specific heat capacity."""
+        return Reported(spec.materials[self.material].specific_heat_capacity, "J/(kg·K)")
+
+    def redefined(self, spec: MachineSpec, value: float) -> MachineSpec:
+        """The machine with another capacity, above none however little one to first order is."""
+        factor = 1.0 + value if value > 0.0 else float(np.exp(value))
+        return with_material(spec, self.material, "specific_heat_capacity", factor)
+
+
 def structural_columns(base: BaseRun) -> dict[str, Array]:
     """Change where every channel sits for a unit of each direction, (G + 1, c) K, by direction."""
     model = model_with_directions(base.predictor.fast)
@@ -85,7 +111,10 @@ def structural_misdescriptions(predictor: Predictor) -> Iterator[Misdescription]
     model = model_with_directions(predictor.fast)
     for item in model.structural:
         unit, scale = TOLD_IN.get(item.unit, (item.unit, 1.0))
-        change = StructuralChange(item.name, scale, tuple(model.changes[item.name].channel.items()))
+        channel = tuple(model.changes[item.name].channel.items())
+        change = StructuralChange(item.name, scale, channel)
+        if item.name.startswith(CAPACITY):
+            change = MaterialCapacity(item.name, scale, material=item.name.removeprefix(CAPACITY))
         yield Misdescription(item.name, item.key, unit, item.sigma / scale, item.statement, change)
 
 

@@ -12,24 +12,30 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc
+from scipy.special import chdtrc, ndtr, ndtri
 
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Reported, quantity
 from spindle_fem.inference import tuned
-from spindle_fem.inference.belief import THETA_BOUND, Belief
+from spindle_fem.inference.belief import THETA_BOUND, Belief, Coordinate
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.linearised_fit import Box, LinearProblem, bounded_minimum
 from spindle_fem.inference.misdescription import Misdescription, Redefinable
 from spindle_fem.inference.opened_machine import DiagnosedMachine
+from spindle_fem.inference.predictor import Predictor
+from spindle_fem.inference.prepared_problem import known_before
 from spindle_fem.inference.set_odds import tempered
+from spindle_fem.inference.uncertain_numbers import UncertainNumber, uncertain_numbers
 from spindle_fem.inference.verdict import PRIOR_SIGMAS, Judgement
+from spindle_fem.units import NORMAL_90_PERCENT
 
 Array = NDArray[np.float64]
 
 # Width of the prior of what is wrong, in standard deviations of the one that is given up.
 WIDER = 10.0
+# Times by which a number may be too large or too small at most.
+MOST_TIMES_OFF = 1000.0
 # Effects beside which a wrong definition is looked for, at most.
 MOST_BESIDE = 2
 
@@ -54,6 +60,8 @@ class WrongDirection:
         What held-out readings become likelier by, as a logarithm that counts.
     by_calibration : bool
         Whether the machine's own calibration says so.
+    limit : float
+        Departure, in widths of the prior, beyond which a definition is not as it says.
     """
 
     direction: Misdescription
@@ -64,6 +72,7 @@ class WrongDirection:
     p_value: float
     told: float = 0.0
     by_calibration: bool = False
+    limit: float = PRIOR_SIGMAS
 
     @property
     def is_beyond_chance(self) -> bool:
@@ -79,12 +88,12 @@ class Redefined:
     ----------
     given : MachineSpec
         As it was given.
-    wrong : WrongDirection
-        Where, as found of the given one.
+    wrong : tuple of WrongDirection
+        Where, each as it was found.
     """
 
     given: MachineSpec
-    wrong: WrongDirection
+    wrong: tuple[WrongDirection, ...]
 
 
 def defined_number(item: Misdescription, spec: Any, value: float = 0.0) -> Reported | None:
@@ -96,11 +105,49 @@ def defined_number(item: Misdescription, spec: Any, value: float = 0.0) -> Repor
 
 
 def departure(item: Misdescription, machine: DiagnosedMachine, value: float) -> float:
-    """How far a machine is from its definition as it was given, in the unit of a direction of this value."""
+    """How far a machine is from its definition as it was given, as a direction of this value counts."""
     before, after = defined_number(item, machine.given), defined_number(item, machine.spec, value)
-    if before is None or after is None:
-        return value
-    return after.value - before.value if item.unit else after.value / before.value - 1.0
+    return value if before is None or after is None else item.between(before.value, after.value)
+
+
+@dataclass(frozen=True, slots=True)
+class _Freed:
+    """Fits about one, to first order, each with the prior of one direction given up.
+
+    Attributes
+    ----------
+    items : list of Misdescription
+        Those that are free in the fit and belong to the machine.
+    rows : list of int
+        Their coordinates.
+    misfit : (n,) ndarray
+        What the cost falls by.
+    position : (n,) ndarray
+        Where each goes, in deviations of its prior.
+    """
+
+    items: list[Misdescription]
+    rows: list[int]
+    misfit: Array
+    position: Array
+
+    @classmethod
+    def of(cls, problem: Problem, null: Fit, directions: Sequence[Misdescription]) -> _Freed:
+        """About a fit of that problem."""
+        belief = problem.belief
+        names = [c.name for c in belief.coordinates]
+        items = [
+            item
+            for item in directions
+            if item.recording is None and not item.of_sensor and item.coordinate in names
+        ]
+        rows = [names.index(item.coordinate) for item in items]
+        box = LinearProblem.about(problem, null).box
+        settled, _ = _least(box)
+        freed = [_least(_freed(box, belief, null, row)) for row in rows]
+        misfit = [settled - cost for cost, _ in freed]
+        position = [null.position[row] + move[row] for row, (_, move) in zip(rows, freed, strict=True)]
+        return cls(items, rows, np.array(misfit), np.array(position))
 
 
 def wrong_direction(
@@ -119,33 +166,49 @@ def wrong_direction(
     trials : int
         Candidates that might explain the recording instead: each as likely beforehand as one direction.
     """
-    belief = problem.belief
-    names = [c.name for c in belief.coordinates]
-    owned = [
-        item
-        for item in directions
-        if item.recording is None and not item.of_sensor and item.coordinate in names
-    ]
-    if not owned:
+    freed = _Freed.of(problem, null, directions)
+    if not freed.items:
         return None
-    rows = [names.index(item.coordinate) for item in owned]
-    box = LinearProblem.about(problem, null).box
-    settled, _ = _least(box)
-    freed = [_least(_freed(box, belief, null, row)) for row in rows]
-    misfit = np.array([settled - cost for cost, _ in freed])
-    count = len(names)
+    belief, count = problem.belief, len(freed.items)
+    size = len(belief.coordinates)
     precision = belief.root.T @ belief.root
-    left = np.diag(precision - precision @ null.covariance[:count, :count] @ precision)[rows]
+    left = np.diag(precision - precision @ null.covariance[:size, :size] @ precision)[freed.rows]
     left = np.maximum(left, 0.0)
-    prior = np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(len(owned) + trials)
-    gains = 0.5 * misfit / (coarseness * tuned.GAIN_DIVISOR) - 0.5 * np.log1p(WIDER**2 * left) + prior
+    prior = np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(count + trials)
+    gains = 0.5 * freed.misfit / (coarseness * tuned.GAIN_DIVISOR) - 0.5 * np.log1p(WIDER**2 * left) + prior
     best = int(np.argmax(gains))
-    level = float(chdtrc(1, misfit[best] / (coarseness * tuned.CHANCE_DIVISOR)))
-    p_value = float(-np.expm1(len(owned) * np.log1p(-min(level, 1.0 - 1e-16))))
-    row = rows[best]
-    value = owned[best].sigma * float(null.position[row] + freed[best][1][row])
-    belief = without_prior(belief, row)
-    return WrongDirection(owned[best], belief, value, float(gains[best]), float(prior), p_value)
+    level = float(chdtrc(1, freed.misfit[best] / (coarseness * tuned.CHANCE_DIVISOR)))
+    item, value = freed.items[best], freed.items[best].sigma * float(freed.position[best])
+    belief = without_prior(belief, freed.rows[best])
+    return WrongDirection(item, belief, value, float(gains[best]), float(prior), _of_any(level, count))
+
+
+def number_beyond_prior(
+    problem: Problem, fit: Fit, numbers: Sequence[UncertainNumber]
+) -> WrongDirection | None:
+    """The number with a prior that a fit holds farthest beyond it; None where it holds none there.
+
+    Of a definition that is right all numbers together are as far out in one of a hundred machines. That the
+    interval is, which readings alone leave of it, needs no likelihood of what else there may be.
+    """
+    freed = _Freed.of(problem, fit, numbers)
+    if not freed.items:
+        return None
+    limit = float(-ndtri(0.5 * -np.expm1(np.log1p(-tuned.SIGNIFICANT) / len(freed.items))))
+    told = np.maximum(fit.stated_sigmas[freed.rows] ** -2.0 - 1.0, 0.0)
+    nearest = np.abs(freed.position) - NORMAL_90_PERCENT / np.sqrt(told + WIDER**-2)
+    best = int(np.argmax(nearest))
+    if nearest[best] <= limit:
+        return None
+    item, value = freed.items[best], freed.items[best].sigma * float(freed.position[best])
+    p_value = _of_any(2.0 * float(ndtr(-nearest[best])), len(freed.items))
+    belief = without_prior(problem.belief, freed.rows[best])
+    return WrongDirection(item, belief, value, 0.0, 0.0, p_value, limit=limit)
+
+
+def _of_any(level: float, count: int) -> float:
+    """Probability that any of so many happens, each of which does with a probability."""
+    return float(-np.expm1(count * np.log1p(-min(level, 1.0 - 1e-16))))
 
 
 def suspected_direction(
@@ -185,22 +248,39 @@ def suspected_direction(
 
 
 def suspected_of_calibration(
-    problem: Problem, fit: Fit, directions: Sequence[Misdescription], spec: Any
+    problem: Problem, fit: Fit, directions: Sequence[Misdescription], machine: DiagnosedMachine
 ) -> WrongDirection | None:
     """The number of the definition that a machine's own calibration holds beyond its prior; None else.
 
-    Nothing is missing there, so that no effect could explain it instead.
+    Nothing is missing there, so that no effect could explain it instead. Of a machine that was made anew
+    what was put right is settled.
     """
-    wrong = wrong_direction(problem, fit, directions, 0)
-    if wrong is None or not wrong.is_beyond_chance or defined_number(wrong.direction, spec) is None:
-        return None
-    return replace(wrong, by_calibration=True)
+    settled = set() if machine.redefined is None else {i.direction.name for i in machine.redefined.wrong}
+    numbers = [item for item in uncertain_numbers(machine.spec) if item.name not in settled]
+    every = [item for item in (*directions, *numbers) if item.name not in settled]
+    told = [item for item in every if defined_number(item, machine.spec) is not None]
+    wrong = wrong_direction(problem, fit, every, 0)
+    if wrong is not None and wrong.direction in told:
+        # One of those that may be told: the others count for nothing.
+        wrong = wrong_direction(problem, fit, told, 0)
+    if wrong is None or wrong.direction not in told or not wrong.is_beyond_chance:
+        wrong = number_beyond_prior(problem, fit, numbers)
+    return None if wrong is None else replace(wrong, by_calibration=True)
 
 
 def _least(box: Box) -> tuple[float, Array]:
     """Least cost within a box, and the move to it."""
     move = bounded_minimum(box.hessian, box.downhill, box.low, box.high)
     return box.cost + float(move @ (box.hessian @ move)) - 2.0 * float(box.downhill @ move), move
+
+
+def _wider(coordinate: Coordinate) -> tuple[float, float]:
+    """Bounds of a coordinate whose prior is given up; those that have another reason stay."""
+    bound = THETA_BOUND * WIDER
+    if coordinate.logarithmic:
+        bound = min(bound, float(np.log(MOST_TIMES_OFF)) / coordinate.sigma)
+    low = -bound if coordinate.low <= -THETA_BOUND else coordinate.low
+    return low, bound if coordinate.high >= THETA_BOUND else coordinate.high
 
 
 def _freed(box: Box, belief: Belief, null: Fit, row: int) -> Box:
@@ -212,18 +292,19 @@ def _freed(box: Box, belief: Belief, null: Fit, row: int) -> Box:
     hessian[: len(less), : len(less)] -= less
     downhill[: len(less)] += less @ departure
     low, high = box.low.copy(), box.high.copy()
-    bound = THETA_BOUND * WIDER
-    low[row], high[row] = -bound - null.position[row], bound - null.position[row]
+    least, most = _wider(belief.coordinates[row])
+    low[row], high[row] = least - null.position[row], most - null.position[row]
     cost = box.cost - float(departure @ less @ departure)
     return replace(box, hessian=hessian, downhill=downhill, low=low, high=high, cost=cost)
 
 
-def open_directions(
-    directions: Sequence[Misdescription], redefined: Redefined | None
-) -> tuple[Misdescription, ...]:
-    """Directions, that in which the definition was put right ``WIDER`` times as wide."""
-    name = None if redefined is None else redefined.wrong.direction.name
-    return tuple(replace(i, sigma=WIDER * i.sigma) if i.name == name else i for i in directions)
+def known_of(predictor: Predictor, redefined: Redefined | None) -> Belief:
+    """Belief before any recording, without the priors of the numbers in which a definition was put right."""
+    belief = known_before(predictor)
+    names = [c.name for c in belief.coordinates]
+    for wrong in () if redefined is None else redefined.wrong:
+        belief = without_prior(belief, names.index(wrong.direction.coordinate))
+    return belief
 
 
 def without_prior(belief: Belief, row: int) -> Belief:
@@ -234,38 +315,46 @@ def without_prior(belief: Belief, row: int) -> Belief:
     precision = np.linalg.inv(covariance)
     root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
     coordinates = list(belief.coordinates)
-    bound = THETA_BOUND * WIDER
-    coordinates[row] = replace(coordinates[row], low=-bound, high=bound)
+    low, high = _wider(coordinates[row])
+    coordinates[row] = replace(coordinates[row], low=low, high=high)
     return replace(belief, coordinates=tuple(coordinates), root=root)
 
 
-def wrong_definition_words(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) -> str:
+def wrong_definition_words(wrong: Sequence[WrongDirection], machine: DiagnosedMachine, fit: Fit) -> str:
     """Where a definition is wrong, and by how much in a fit."""
-    item, value = wrong.direction, fit.values[wrong.direction.coordinate]
+    told = [f"{item.direction.key}: {_amount(item, machine, fit)}" for item in wrong]
+    return f"the definition is off at {', and at '.join(told)}"
+
+
+def _amount(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) -> str:
+    item = wrong.direction
+    value = item.amount(fit.values[item.coordinate])
     before, after = defined_number(item, machine.given), defined_number(item, machine.spec, value)
     if before is None or after is None:
-        amount = f"{item.statement}, by {f'{value:.3g} {item.unit}'.strip()}"
-    else:
-        told_by = "calibration" if wrong.by_calibration else "recording"
-        amount = f"it says {quantity(before)}, the {told_by} {quantity(after)}"
-    return f"the definition is off at {item.key}: {amount}"
+        return f"{item.statement}, by {f'{value:.3g} {item.unit}'.strip()}"
+    told_by = "calibration" if wrong.by_calibration else "recording"
+    return f"it says {quantity(before)}, the {told_by} {quantity(after)}"
 
 
 def with_wrong_definition(
-    judgement: Judgement, wrong: WrongDirection, machine: DiagnosedMachine
+    judgement: Judgement, wrong: Sequence[WrongDirection], machine: DiagnosedMachine
 ) -> Judgement:
-    """A judgement with a parameter that is off, by its definition, unless physics is missing beside it."""
+    """A judgement with parameters that are off, by its definition, unless physics is missing beside them."""
     if judgement.verdict not in ("consistent", "sensor"):
         return judgement
     reason = judgement.reason
     if judgement.verdict == "consistent":
         reason = wrong_definition_words(wrong, machine, judgement.chosen.fit)
-    return replace(
-        judgement, verdict="parameter", p_value=min(judgement.p_value, wrong.p_value), reason=reason
-    )
+    p_value = min(judgement.p_value, *(item.p_value for item in wrong))
+    return replace(judgement, verdict="parameter", p_value=p_value, reason=reason)
 
 
 def is_beyond_prior(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) -> bool:
-    """Whether the direction of a fit is where its prior holds it with less than 1 %."""
+    """Whether the whole interval of a direction in a fit is where its prior hardly holds it."""
     item = wrong.direction
-    return abs(departure(item, machine, fit.values[item.coordinate])) > PRIOR_SIGMAS * item.sigma
+    values = (
+        fit.values[item.coordinate],
+        *fit.interval(item.coordinate, NORMAL_90_PERCENT, fit.stated_sigmas),
+    )
+    far = [departure(item, machine, item.amount(value)) / item.sigma for value in values]
+    return min(np.abs(far)) > wrong.limit and np.ptp(np.sign(far)) == 0.0

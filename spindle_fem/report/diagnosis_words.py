@@ -33,8 +33,7 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
         Of ``diagnosis.json``.
     """
     verdict, fit = content["verdict"], content["fit"]
-    wrong = (content.get("misdescription") or {}).get("wrong")
-    off = "" if wrong is None else f"{wrong_definition_words(wrong)} "
+    off = "".join(f"{wrong_definition_words(row)} " for row in wrong_rows(content))
     if verdict == "unexplained" and not content["findings"]:
         reason = str(content.get("reason") or "the difference follows nothing that the catalogue holds")
         return f"The difference between recording and model is not explained: {reason.rstrip('.')}."
@@ -145,6 +144,12 @@ def misdescription_words(row: Mapping[str, Any]) -> str:
     unit = f" {row['unit']}" if row["unit"] else ""
     middle, low, high = (significant(row[key]) for key in ("value", "low", "high"))
     return f"{capital(row['statement'])}: {middle}{unit} ({low} to {high}{unit})."
+
+
+def wrong_rows(content: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Where the definition of ``diagnosis.json`` is wrong."""
+    own = content.get("misdescription") or {}
+    return [row for row in (own.get("wrong"), *own.get("also_wrong", ())) if row is not None]
 
 
 def wrong_definition_words(row: Mapping[str, Any]) -> str:
@@ -311,9 +316,8 @@ def checks(content: Mapping[str, Any]) -> list[str]:
         return ["Nothing: the machine does what its definition says."]
     effects = catalogue()
     found: dict[str, None] = {}
-    wrong = (content.get("misdescription") or {}).get("wrong")
-    if wrong is not None:
-        found[f"Drawing, data sheet or machine: is {wrong['key']} as the definition has it?"] = None
+    for row in wrong_rows(content):
+        found[f"Drawing, data sheet or machine: is {row['key']} as the definition has it?"] = None
     sets = [content["findings"], *(item["findings"] for item in content["alternatives"])]
     for item in [finding for findings in sets for finding in findings]:
         text = item.get("check") or (effects[item["effect"]].check if item["effect"] in effects else "")

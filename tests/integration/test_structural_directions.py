@@ -28,6 +28,7 @@ CHOSEN = (
     "channel.film_along.1",
     "joint.front.outer_seats.up",
     "mass.shaft.nose_end",
+    "capacity.steel_42CrMo4",
     "air.outside",
 )
 

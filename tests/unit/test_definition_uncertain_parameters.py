@@ -9,6 +9,7 @@ import pytest
 from spindle_fem.definition.load import load_machine, validate
 from spindle_fem.definition.uncertain_parameters import (
     UncertainParameter,
+    coefficient_value,
     uncertain_parameters,
     with_parameters,
 )
@@ -42,12 +43,27 @@ def test_the_recorded_spindle_carries_the_stated_uncertainties_and_no_others():
 def test_nominal_values_come_with_their_units():
     by_name = {item.name: item for item in uncertain_parameters(RECORDED)}
     assert by_name["film.flange_back"] == UncertainParameter(
-        "film.flange_back", ("film.flange_back",), 200.0, "W/m**2/K", 0.5
+        "film.flange_back", ("film.flange_back",), ("film.flange_back.coefficient",), 200.0, "W/m**2/K", 0.5
     )
     assert by_name["heat.inner_share"].value == 0.5
     assert by_name["shaft_end_films"] == UncertainParameter(
-        "shaft_end_films", ("film.nose_end", "film.drive_end"), 1.0, "", 0.3
+        "shaft_end_films",
+        ("film.nose_end", "film.drive_end"),
+        ("film.nose_end.factor", "film.drive_end.factor"),
+        1.0,
+        "",
+        0.3,
     )
+
+
+@pytest.mark.parametrize("machine", ["recorded_spindle", "wu_tan_2016", "motor_spindle"])
+def test_keys_are_those_by_which_a_definition_is_changed(machine):
+    spec = load_machine(machine)
+    for item in uncertain_parameters(spec):
+        for coefficient, key in zip(item.applies_to, item.keys, strict=True):
+            value, unit = coefficient_value(spec, coefficient)
+            changed = load_machine(machine, [f"{key}={0.9 * value} {unit}".strip()])
+            assert coefficient_value(changed, coefficient)[0] == pytest.approx(0.9 * value), key
 
 
 def test_a_prior_by_bounds_is_a_parameter_like_any_other():

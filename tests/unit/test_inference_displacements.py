@@ -255,7 +255,7 @@ def test_an_expansion_that_is_off_is_told_in_micrometres(heated):
         stated_fit=fit,
         null=fit,
         judgement=judgement,
-        wrong=None,
+        wrong=(),
     )
     content = misdescription_content(made, SimpleNamespace())
     (row,) = content["left_open"]

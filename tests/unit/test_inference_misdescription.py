@@ -283,15 +283,15 @@ def test_a_definition_far_off_in_one_direction_is_found_there(off_at):
     assert wrong.is_beyond_chance
     assert is_beyond_prior(wrong, GIVEN, refitted)
     nothing = Judgement("consistent", 0.5, Ranked(Hypothesis(refitted, 0.0), 1.0), (), 0.0, "")
-    judged = with_wrong_definition(nothing, wrong, GIVEN)
+    judged = with_wrong_definition(nothing, [wrong], GIVEN)
     assert judged.verdict == "parameter"
     assert "heat.table" in judged.reason
     assert judged.p_value < 0.01
     # beside physics that is missing
     physics = replace(nothing, verdict="missing_physics")
-    assert with_wrong_definition(physics, wrong, GIVEN) is physics
+    assert with_wrong_definition(physics, [wrong], GIVEN) is physics
     lying = replace(nothing, verdict="sensor", reason="a sensor lies")
-    beside = with_wrong_definition(lying, wrong, GIVEN)
+    beside = with_wrong_definition(lying, [wrong], GIVEN)
     assert (beside.verdict, beside.reason) == ("parameter", "a sensor lies")
 
 
@@ -308,13 +308,14 @@ def test_a_direction_is_suspected_where_it_explains_more_than_any_set(case, off_
     assert suspected(nothing, replace(other, log_prior=20.0)) is None
     assert suspected(nothing, replace(other, log_prior=-100.0)).direction.name == "F1"
     # no number of a definition could be tried, by a calibration or beside effects
-    assert suspected_of_calibration(problem, null, directions, None) is None
+    machine = SimpleNamespace(spec=case.fast.spec, redefined=None)
+    assert suspected_of_calibration(problem, null, directions, machine) is None
     beside = Hypothesis(problem.fit((case.candidates["sensor_offset", "SP05"],)), 0.0)
     unlikely = replace(nothing, log_prior=-1000.0)
     assert suspected(unlikely, beside) is None
     numbers = [replace(i, change=Number(FRONT[:1], *ALWAYS)) if i.name == "F1" else i for i in directions]
     for found in (
-        suspected_of_calibration(problem, null, numbers, None),
+        suspected_of_calibration(problem, null, numbers, machine),
         suspected_direction(problem, [unlikely, beside], numbers, 100, 1.0, None),
     ):
         assert found.direction.name == "F1"
@@ -395,7 +396,7 @@ def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
             stated_fit=fit,
             null=fit,
             judgement=verdict,
-            wrong=wrong,
+            wrong=(wrong,),
         ),
         GIVEN,
     )

@@ -31,15 +31,8 @@ from spindle_fem.model.reduced.mesh_model import MeshModel, build_mesh_model
 from spindle_fem.model.reduced.reduced_cache import reduced_digest
 from spindle_fem.model.reduced.snapshots import Sample, SnapshotSpace
 from spindle_fem.model.reduced.spindle_inputs import SpindleInputs
-from spindle_fem.model.reduced.structural_directions import (
-    FIELDS,
-    WARMTH,
-    Difference,
-    FullMachine,
-    StructuralDirection,
-    structural_directions,
-    with_channel,
-)
+from spindle_fem.model.reduced.structural_causes import FIELDS, WARMTH, Difference, FullMachine, with_channel
+from spindle_fem.model.reduced.structural_directions import StructuralDirection, structural_directions
 from spindle_fem.model.reduced.unit_loads import coolant_loads, fluid_loads
 from spindle_fem.model.thermal_model import ThermalModel, project
 from spindle_fem.operation.coefficient_table import build_coefficient_table
