@@ -32,10 +32,12 @@ from spindle_fem.inference.misdescription_content import misdescription_content
 from spindle_fem.inference.mounting_misdescriptions import Bridge, mounting_misdescriptions
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
-from spindle_fem.inference.verdict import Judgement
+from spindle_fem.inference.uncertain_numbers import uncertain_numbers
+from spindle_fem.inference.verdict import PRIOR_SIGMAS, Judgement
 from spindle_fem.inference.wrong_definition import (
     WIDER,
     is_beyond_prior,
+    number_beyond_prior,
     suspected_direction,
     suspected_of_calibration,
     with_wrong_definition,
@@ -321,6 +323,25 @@ def test_a_direction_is_suspected_where_it_explains_more_than_any_set(case, off_
         assert found.direction.name == "F1"
         assert found.value == pytest.approx(0.55, abs=0.1)
         assert found.is_beyond_chance
+
+
+@pytest.mark.parametrize(("factor", "told"), [(2.2, True), (1.25, False)])
+def test_a_value_with_a_prior_is_suspected_where_its_interval_is_beyond_it(case, predictor, factor, told):
+    """Heat that is known within a tenth: a quarter more is rare, not out of what the definition says."""
+    true = predictor.predict(0, {"heat.front": factor}).temperature
+    at_stamps = np.array([np.interp(TIMES, predictor.drives[0].grid, column) for column in true.T]).T
+    noise = np.random.default_rng(3).normal(0.0, 0.1, at_stamps.shape)
+    seen = Predictor(case.fast, [written(case.folder, at_stamps - 273.15 + noise)])
+    problem = Problem(seen, calibrate(None, seen).belief, EXPECTED_SLOW, seen.observations)
+    numbers = tuple(uncertain_numbers(case.fast.spec))
+    found = number_beyond_prior(problem, problem.fit(), numbers)
+    assert (found is not None) == told
+    if told:
+        assert found.direction.key == "bearing_set.front.heat_factor"
+        assert found.value == pytest.approx(np.log(factor), abs=0.15)
+        assert found.limit > PRIOR_SIGMAS  # of one number among many
+        assert found.p_value < 0.01
+    assert number_beyond_prior(problem, problem.fit(), ()) is None
 
 
 class Number(SpeedShape):
