@@ -6,7 +6,7 @@ the machine with another value, until the recordings ask for no other.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from spindle_fem.definition.machine_spec import MachineSpec
@@ -28,6 +28,8 @@ from spindle_fem.inference.wrong_definition import (
 
 # Times that a machine is made anew at most; nine wrong numbers that were tried took one or two.
 MOST_TIMES = 3
+# Shares of a foreseen change that are tried: to first order a channel may go through the wall.
+SHARES = (1.0, 0.5, 0.25)
 # Wrong numbers of one definition at most: a material that is another one has two.
 MOST_NUMBERS = 3
 
@@ -97,11 +99,8 @@ def _followed(
     values = [*(_fitted(_telling(item, found), item.direction)[0] for item in wrong[:-1]), last.value]
     for _ in range(MOST_TIMES):
         progress(f"definition put right: {', '.join(item.direction.key for item in wrong)}")
-        spec = opened.spec
         try:
-            for item, value in zip(wrong, values, strict=True):
-                spec = item.direction.change.redefined(spec, value)
-            other = replace(with_definition(opened, spec, progress), redefined=Redefined(given, wrong))
+            other = replace(_made(opened, wrong, values, progress), redefined=Redefined(given, wrong))
             again = diagnosed(other)
         except SpindleFemError as error:
             note = f"The machine could not be made anew with another {last.direction.key}: {error}"
@@ -114,6 +113,25 @@ def _followed(
         if all(abs(value) <= width for value, width in fitted):
             break
     return opened, found
+
+
+def _made(
+    opened: DiagnosedMachine,
+    wrong: Sequence[WrongDirection],
+    values: Sequence[float],
+    progress: Callable[[str], None],
+) -> DiagnosedMachine:
+    """The machine with wrong numbers changed as foreseen; by less where no machine is like that."""
+    refused: SpindleFemError | None = None
+    for share in SHARES:
+        spec = opened.spec
+        for item, value in zip(wrong, values, strict=True):
+            spec = item.direction.change.redefined(spec, share * value)
+        try:
+            return with_definition(opened, spec, progress)
+        except SpindleFemError as error:
+            refused = refused or error
+    raise refused
 
 
 def _is_told(wrong: WrongDirection, given: Diagnosis, other: DiagnosedMachine, again: Diagnosis) -> bool:

@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 WIDER = 10.0
 # Times by which a number may be too large or too small at most.
 MOST_TIMES_OFF = 1000.0
+# Distance from a bound at which a coordinate is held by it, in deviations of its prior.
+AT_BOUND = 0.05
 # Effects beside which a wrong definition is looked for, at most.
 MOST_BESIDE = 2
 
@@ -259,13 +261,24 @@ def suspected_of_calibration(
     numbers = [item for item in uncertain_numbers(machine.spec) if item.name not in settled]
     every = [item for item in (*directions, *numbers) if item.name not in settled]
     told = [item for item in every if defined_number(item, machine.spec) is not None]
-    wrong = wrong_direction(problem, fit, every, 0)
+    # What is held at its bound would go further: first order undervalues it, and others stand in for it.
+    held = [item for item in told if _is_held(problem, fit, item)]
+    wrong = wrong_direction(problem, fit, held or every, 0)
     if wrong is not None and wrong.direction in told:
         # One of those that may be told: the others count for nothing.
-        wrong = wrong_direction(problem, fit, told, 0)
+        wrong = wrong_direction(problem, fit, held or told, 0)
     if wrong is None or wrong.direction not in told or not wrong.is_beyond_chance:
         wrong = number_beyond_prior(problem, fit, numbers)
     return None if wrong is None else replace(wrong, by_calibration=True)
+
+
+def _is_held(problem: Problem, fit: Fit, item: Misdescription) -> bool:
+    """Whether a direction lies at one of its bounds in a fit."""
+    own = next((k for k, c in enumerate(problem.belief.coordinates) if c.name == item.coordinate), None)
+    if own is None:
+        return False
+    coordinate, position = problem.belief.coordinates[own], fit.position[own]
+    return min(position - coordinate.low, coordinate.high - position) < AT_BOUND
 
 
 def _least(box: Box) -> tuple[float, Array]:

@@ -290,6 +290,23 @@ def test_nothing_is_made_anew_where_nothing_is_suspected(spec, machines_made):
     assert not machines_made
 
 
+def test_what_is_foreseen_too_far_is_tried_nearer(spec, monkeypatch, machines_made):
+    """9 mm deeper goes through the wall, half as much does not."""
+    within = redefined_machine.with_definition
+
+    def with_definition(machine, changed, progress):
+        if changed.channel.depth > spec.channel.depth + 5e-3:
+            raise SpecError("channel.depth", "deeper than the wall.", "Allowed: less.")
+        return within(machine, changed, progress)
+
+    monkeypatch.setattr(redefined_machine, "with_definition", with_definition)
+    machine, found = with_definition_put_right(
+        opened(spec), diagnosis_of(DEEPER, 9.0, by_calibration=True), lambda machine: settled(DEEPER, 0.0)
+    )
+    assert machine.spec.channel.depth == pytest.approx(spec.channel.depth + 4.5e-3)
+    assert found.judgement.verdict == "parameter"
+
+
 def test_a_machine_that_cannot_be_made_anew_is_said_so(spec, machines_made):
     def refused(machine):
         raise SpecError("channel.depth", "deeper than the wall.", "Allowed: less.")
