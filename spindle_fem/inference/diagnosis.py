@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from functools import partial
 
@@ -86,6 +86,9 @@ class Diagnosis:
     seconds : mapping of stage to float
     wrong : tuple of WrongDirection
         Where the definition is wrong.
+    put_right : mapping of str to float
+        How far the definition that was diagnosed is from the given one in each of those, in deviations of
+        its prior, by coordinate.
     suspected : WrongDirection or None
         A number of it that is to be tried by making the machine anew.
     followed : Followed or None
@@ -107,6 +110,7 @@ class Diagnosis:
     candidates_tried: int
     seconds: Mapping[str, float]
     wrong: tuple[WrongDirection, ...] = ()
+    put_right: Mapping[str, float] = field(default_factory=dict)
     suspected: WrongDirection | None = None
     followed: Followed | None = None
     notes: tuple[str, ...] = ()
@@ -321,9 +325,9 @@ def diagnose_recordings(
         tried,
         clock.laps,
         told,
-        None if freed else wrong,
-        followed,
-        notes,
+        suspected=None if freed else wrong,
+        followed=followed,
+        notes=notes,
     )
 
 

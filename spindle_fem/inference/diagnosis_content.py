@@ -26,7 +26,6 @@ from spindle_fem.inference.mismatch_place import where_of
 from spindle_fem.inference.missing_heat import stretches
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.verdict import Judgement
-from spindle_fem.inference.wrong_definition import departure
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.units import NORMAL_90_PERCENT
 
@@ -87,7 +86,7 @@ def diagnosis_content(
             "displacements_after": displacement_errors(predictor, after),
         },
         "improved_model": "improved_machine.toml",
-        "machine_parameters": _machine_parameters(diagnosis, opened),
+        "machine_parameters": _machine_parameters(diagnosis),
         "misdescription": misdescription_content(diagnosis, opened),
         "slow_error": {"sigma_K": diagnosis.final.slow.sigma, "time_s": diagnosis.final.slow.time},
         "candidates_tried": diagnosis.candidates_tried,
@@ -138,20 +137,18 @@ def _reasons(opened: DiagnosedMachine, judgement: Judgement) -> tuple[str, ...]:
     )
 
 
-def _machine_parameters(diagnosis: Diagnosis, opened: DiagnosedMachine) -> list[dict[str, Any]]:
+def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The machine's own parameters before and after, those apart that no key of the definition has.
 
     What was put right counts from the definition as given.
     """
     fit, rows = diagnosis.stated_fit, []
-    put_right = {i.direction.coordinate: i.direction for i in diagnosis.wrong}
     sigmas = fit.stated_sigmas
     for coordinate in diagnosis.machine_coordinates:
         if coordinate.name.startswith((MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)):
             continue
         low, high = fit.interval(coordinate.name, NORMAL_90_PERCENT, sigmas)
-        item = put_right.get(coordinate.name)
-        times = 1.0 if item is None else float(np.exp(departure(item, opened, 0.0)))
+        times = float(np.exp(coordinate.sigma * diagnosis.put_right.get(coordinate.name, 0.0)))
         rows.append(
             {
                 "name": coordinate.name,

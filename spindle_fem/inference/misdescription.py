@@ -108,6 +108,10 @@ class Misdescription:
         """How far a number of the definition goes from one value to another, as the prior's width counts."""
         return found - given if self.unit else found / given - 1.0
 
+    def told(self, departure: float) -> float:
+        """A departure that :meth:`between` gives, as it is told: in the unit, or as a share."""
+        return departure
+
 
 def delays_in(number: int, directions: Sequence[Misdescription]) -> dict[str, str]:
     """Of each direction that is a delay in a recording its coordinate, and the channel that it makes late."""

@@ -68,7 +68,7 @@ def _wrong_row(
     for key in ("largest_K", "largest_um"):
         if key in row and fitted["value"]:
             row[key] *= abs(beyond["value"] / fitted["value"])
-    row |= beyond | {"sigmas": beyond["value"] / item.sigma}
+    row |= {key: item.told(value) for key, value in beyond.items()} | {"sigmas": beyond["value"] / item.sigma}
     before = defined_number(item, machine.given)
     if before is not None:
         row["defined"] = {"given": before.value, "unit": before.unit}

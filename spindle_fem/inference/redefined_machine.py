@@ -21,6 +21,7 @@ from spindle_fem.inference.set_odds import log_odds
 from spindle_fem.inference.wrong_definition import (
     Redefined,
     WrongDirection,
+    departure,
     is_beyond_prior,
     with_wrong_definition,
     wrong_definition_words,
@@ -76,6 +77,10 @@ def with_definition_put_right(
         found,
         judgement=judgement,
         wrong=wrong,
+        put_right={
+            item.coordinate: departure(item, opened, 0.0) / item.sigma
+            for item in (each.direction for each in wrong)
+        },
         notes=notes,
         unchanged=diagnosis.unchanged,
         null=diagnosis.null,

@@ -66,10 +66,14 @@ class UncertainNumber(Misdescription):
         """The logarithm of their ratio, in which the prior is normal."""
         return float(np.log(found / given))
 
+    def told(self, departure: float) -> float:
+        """A logarithm as a share."""
+        return float(np.expm1(departure))
+
 
 def uncertain_numbers(spec: MachineSpec) -> Iterator[UncertainNumber]:
     """Every uncertain parameter of a machine with geometry."""
     for item in uncertain_parameters(spec):
         keys = ", ".join(item.keys)
         change = Scaled(item.name, item.applies_to[0])
-        yield UncertainNumber(item.name, keys, "", item.sigma_log, f"value of {keys}", change)
+        yield UncertainNumber(item.name, keys, "", item.sigma_log, f"share by which {keys} is larger", change)

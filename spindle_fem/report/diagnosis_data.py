@@ -289,17 +289,19 @@ def _parameters(diagnosis: Diagnosis) -> dict[str, Any]:
     rows = [_index(fit, item) for item in own]
     spread = fit.stated_sigmas
     sigmas = {"units": "1", "long_name": "in prior standard deviations from nominal"}
+    # What was put right counts from the definition as it was given.
+    off = np.array([diagnosis.put_right.get(item.name, 0.0) for item in own])
     return {
         "parameter": [item.name for item in own],
         "parameter_nominal": ("parameter", np.array([item.value for item in own])),
         "parameter_prior_sigma": ("parameter", np.array([item.sigma for item in own])),
-        "parameter_low": ("parameter", np.array([item.low for item in own]), sigmas),
-        "parameter_high": ("parameter", np.array([item.high for item in own]), sigmas),
+        "parameter_low": ("parameter", off + [item.low for item in own], sigmas),
+        "parameter_high": ("parameter", off + [item.high for item in own], sigmas),
         "parameter_logarithmic": ("parameter", np.array([item.logarithmic for item in own]).astype(np.int8)),
         "parameter_unit": ("parameter", [item.unit for item in own]),
-        "parameter_known": ("parameter", np.asarray(belief.mean), sigmas),
+        "parameter_known": ("parameter", off + belief.mean, sigmas),
         "parameter_known_sigma": ("parameter", np.sqrt(np.diag(known)), sigmas),
-        "parameter_fitted": ("parameter", np.array([fit.position[i] for i in rows]), sigmas),
+        "parameter_fitted": ("parameter", off + [fit.position[i] for i in rows], sigmas),
         "parameter_fitted_sigma": ("parameter", np.array([spread[i] for i in rows]), sigmas),
     }
 
