@@ -26,6 +26,7 @@ from spindle_fem.inference.mismatch_place import where_of
 from spindle_fem.inference.missing_heat import stretches
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.verdict import Judgement
+from spindle_fem.inference.wrong_definition import numbers_far_off
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.units import NORMAL_90_PERCENT
 
@@ -95,6 +96,7 @@ def diagnosis_content(
         "notes": [
             *opened.notes,
             *diagnosis.notes,
+            *numbers_far_off(diagnosis.stated_fit, opened, diagnosis.wrong),
             *dict.fromkeys(note for drive in predictor.drives for note in drive.notes),
         ],
         "defects": [recording.defects.to_json() for recording in predictor.recordings],

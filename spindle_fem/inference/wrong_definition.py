@@ -18,6 +18,7 @@ from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Reported, quantity
 from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import THETA_BOUND, Belief, Coordinate
+from spindle_fem.inference.calibration import LEARNED_BELOW
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
 from spindle_fem.inference.linearised_fit import Box, LinearProblem, bounded_minimum
@@ -196,9 +197,11 @@ def number_beyond_prior(
     freed = _Freed.of(problem, fit, numbers)
     if not freed.items:
         return None
-    limit = float(-ndtri(0.5 * -np.expm1(np.log1p(-tuned.SIGNIFICANT) / len(freed.items))))
-    told = np.maximum(fit.stated_sigmas[freed.rows] ** -2.0 - 1.0, 0.0)
+    limit, widths = _limit_of(len(freed.items)), fit.stated_sigmas[freed.rows]
+    told = np.maximum(widths**-2.0 - 1.0, 0.0)
     nearest = np.abs(freed.position) - NORMAL_90_PERCENT / np.sqrt(told + WIDER**-2)
+    # Where readings hardly tell a number, first order sends it anywhere.
+    nearest[widths >= LEARNED_BELOW] = 0.0
     best = int(np.argmax(nearest))
     if nearest[best] <= limit:
         return None
@@ -206,6 +209,30 @@ def number_beyond_prior(
     p_value = _of_any(2.0 * float(ndtr(-nearest[best])), len(freed.items))
     belief = without_prior(problem.belief, freed.rows[best])
     return WrongDirection(item, belief, value, 0.0, 0.0, p_value, limit=limit)
+
+
+def _limit_of(count: int) -> float:
+    """Deviations beyond which the farthest of so many right numbers lies in one of a hundred machines."""
+    return float(-ndtri(0.5 * -np.expm1(np.log1p(-tuned.SIGNIFICANT) / count)))
+
+
+def numbers_far_off(diagnosed: Fit, machine: DiagnosedMachine, wrong: Sequence[WrongDirection]) -> list[str]:
+    """Values with a prior that a fit has farther off than a right definition would, in words.
+
+    Those apart that are told to be wrong.
+    """
+    known, told = {c.name: c for c in diagnosed.coordinates}, {item.direction.name for item in wrong}
+    numbers = [] if machine.is_network else [i for i in uncertain_numbers(machine.spec) if i.name in known]
+    far = []
+    for item in numbers:
+        deviations = item.amount(diagnosed.values[item.coordinate]) / item.sigma
+        if item.name not in told and abs(deviations) > _limit_of(len(numbers)):
+            times = diagnosed.values[item.coordinate]
+            far.append(
+                f"The fit has {item.key} {times:.2g} times as large as the definition, {abs(deviations):.1f} "
+                "deviations of its prior off: check it"
+            )
+    return far
 
 
 def _of_any(level: float, count: int) -> float:

@@ -98,3 +98,28 @@ def test_a_number_of_the_definition_that_is_wrong_is_told_with_what_is_missing_b
     improved = load_machine(tmp_path / "out" / "improved_machine.toml")
     conductivity = improved.materials["cast_iron"].thermal_conductivity
     assert conductivity == pytest.approx(wrong["defined"]["value"], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "given", "unit"),
+    [
+        ("example_2_heat_scale", "film.flange_back.coefficient", 20.0, "W/m**2/K"),
+        ("example_5_coolant_film", "coolant.film_factor", 0.35, ""),
+    ],
+)
+def test_a_value_with_a_prior_that_is_wrong_is_told_by_the_calibration_beside_what_has_changed_since(
+    name, key, given, unit, tmp_path
+):
+    """The film that is wrong in the definition and the one that fouled are one film."""
+    answer = json.loads((EXAMPLES / "answers" / f"{name}.json").read_text(encoding="utf-8"))
+    true = {
+        "film.flange_back.coefficient": 200.0 * answer["as_built"]["flg"],
+        "coolant.film_factor": answer["as_built"]["film"],
+    }[key]
+    content = diagnosed(name, tmp_path / "out", f"{key}={given} {unit}".strip())
+    assert any(is_acceptable(content["findings"], item) for item in answer["acceptable_sets"])
+    wrong = content["misdescription"]["wrong"]
+    assert wrong["key"] == key
+    assert wrong["defined"]["given"] == given
+    assert wrong["defined"]["low"] < true < wrong["defined"]["high"]
+    assert content["misdescription"]["also_wrong"] == []

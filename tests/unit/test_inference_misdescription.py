@@ -38,6 +38,7 @@ from spindle_fem.inference.wrong_definition import (
     WIDER,
     is_beyond_prior,
     number_beyond_prior,
+    numbers_far_off,
     suspected_direction,
     suspected_of_calibration,
     with_wrong_definition,
@@ -342,6 +343,12 @@ def test_a_value_with_a_prior_is_suspected_where_its_interval_is_beyond_it(case,
         assert found.limit > PRIOR_SIGMAS  # of one number among many
         assert found.p_value < 0.01
     assert number_beyond_prior(problem, problem.fit(), ()) is None
+    machine = SimpleNamespace(spec=case.fast.spec, is_network=False)
+    notes = numbers_far_off(problem.fit(), machine, ())
+    assert any("bearing_set.front.heat_factor" in note for note in notes) == told
+    assert not told or numbers_far_off(problem.fit(), machine, [found]) == [
+        note for note in notes if "front.heat_factor" not in note
+    ]
 
 
 class Number(SpeedShape):
