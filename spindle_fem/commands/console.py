@@ -251,38 +251,38 @@ def print_simulation(content: dict[str, Any], folder: Path) -> None:
 
 def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
     """Verdict, findings, alternatives and the fit before and after."""
-    from spindle_fem.report.diagnosis_words import fit_rows, fits_told, level_of
+    from spindle_fem.report import diagnosis_words as words
 
     console = open_console()
-    fit, p = content["fit"], level_of(content)
+    fit, p = content["fit"], words.level_of(content)
     _print_marked(console, content["verdict"], f"  (p {p})" if p else "", "bold")
     if content["reason"]:
         console.print(content["reason"])
     for finding in content["findings"]:
         lead = "Comes nearest: " if content["verdict"] == "unexplained" else ""
         console.print(f"{lead}{finding['statement']}  (set: {content['set_probability']:.2f})")
+    for row in words.wrong_rows(content) if content["findings"] else ():
+        console.print(words.wrong_definition_words(row))
     if content["alternatives"]:
         table = headed_table("Not ruled out", "set", "probability", sentences=True)
         for item in content["alternatives"]:
-            names = " + ".join(f"{f['effect']} at {f['component']}" for f in item["findings"])
-            table.add_row(names or "nothing missing", _number(item["probability"], 3))
+            table.add_row(words.set_words(item["findings"]), _number(item["probability"], 3))
         console.print(table)
     if fit["noise_K"] is not None:
         table = headed_table("Fit", "", "fitted K", "held out K")
-        for row in fit_rows(fit):
+        for row in words.fit_rows(fit):
             table.add_row(row["model"], _number(row["fitted"], 3), _number(row["heldout"], 3))
         full = fit["full_model"]
-        for when, name in fits_told(fit).items() if full["reason"] is None else ():
+        for when, name in words.fits_told(fit).items() if full["reason"] is None else ():
             errors = (full[when]["train_rmse_K"], full[when]["heldout_rmse_K"])
             table.add_row(f"{name}, full model", *(_number(error, 3) for error in errors))
         table.add_row("noise", _number(fit["noise_K"], 3), _number(fit["noise_K"], 3))
         console.print(table)
     if fit["full_model"]["mesh"] != "off" and fit["full_model"]["reason"]:
         console.print(f"Full model: {fit['full_model']['reason']}")
-    following = content["next_measurement"]
     for note in content.get("notes", ()):
         console.print(note, style="dim")
-    console.print(f"Next: {following['quantity']} at {following['where']}, {following['condition']}.")
+    console.print("Next: {quantity} at {where}, {condition}.".format_map(content["next_measurement"]))
     console.print(f"Files: {folder}")
 
 

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from spindle_fem.definition.machine_spec import MachineSpec
-from spindle_fem.effects.framework.effect import capital
 from spindle_fem.errors import SpindleFemError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.diagnosis import Diagnosis
@@ -24,7 +23,6 @@ from spindle_fem.inference.wrong_definition import (
     departure,
     is_beyond_prior,
     with_wrong_definition,
-    wrong_definition_words,
 )
 
 # Times that a machine is made anew at most; nine wrong numbers that were tried took one or two.
@@ -70,18 +68,14 @@ def with_definition_put_right(
     wrong = tuple(item for item in told if is_beyond_prior(item, opened, _telling(item, found)))
     if not wrong:
         return machine, found if opened is machine else diagnosis
-    judgement, notes = with_wrong_definition(found.judgement, wrong, opened), found.notes
-    if found.judgement.verdict != "consistent":
-        notes = (capital(wrong_definition_words(wrong, opened, found.final)), *notes)
     return opened, replace(
         found,
-        judgement=judgement,
+        judgement=with_wrong_definition(found.judgement, wrong, opened),
         wrong=wrong,
         put_right={
             item.coordinate: departure(item, opened, 0.0) / item.sigma
             for item in (each.direction for each in wrong)
         },
-        notes=notes,
         unchanged=diagnosis.unchanged,
         null=diagnosis.null,
         explanations=diagnosis.explanations,

@@ -254,13 +254,13 @@ def replace_chosen(judgement, fit):
     return replace(judgement, chosen=SimpleNamespace(fit=fit))
 
 
-def test_a_wrong_definition_beside_physics_is_a_note(spec, machines_made):
+def test_a_wrong_definition_beside_physics_leaves_the_verdict(spec, machines_made):
     first = diagnosis_of(CONDUCTS, 0.9, "missing_physics", gain=0.0)
     _, found = with_definition_put_right(
         opened(spec), first, lambda machine: settled(CONDUCTS, 0.0, "missing_physics")
     )
     assert found.judgement.verdict == "missing_physics"
-    assert found.notes[0].startswith("The definition is off at key: it says")
+    assert found.wrong == (first.suspected,)
 
 
 def test_what_a_calibration_says_needs_no_odds(spec, machines_made):

@@ -62,6 +62,30 @@ def test_findings_of_a_verdict_without_explanation_are_no_statements(verdict, ca
     assert ("Comes nearest: 312 W" in capsys.readouterr().out) == unexplained
 
 
+def test_every_wrong_number_of_a_definition_is_said_beside_what_is_missing(capsys):
+    def number(key, given):
+        defined = {"given": given, "value": 2.0 * given, "low": given, "high": 3.0 * given, "unit": "mm"}
+        return {"key": key, "defined": defined}
+
+    told = content("missing_physics")
+    told["misdescription"] = {
+        "wrong": number("channel.depth", 3.0),
+        "also_wrong": [number("channel.z_start", 50.0)],
+    }
+    said = (
+        "The definition is off at channel.depth: 6 mm (3 to 9), where it says 3.",
+        "The definition is off at channel.z_start: 100 mm (50 to 150), where it says 50.",
+    )
+    assert all(text in verdict_sentence(told) for text in said)
+    assert [text for text in checks(told) if "channel" in text] == [
+        "Drawing, data sheet or machine: is channel.depth as the definition has it?",
+        "Drawing, data sheet or machine: is channel.z_start as the definition has it?",
+    ]
+    print_diagnosis(told, Path())
+    shown = " ".join(capsys.readouterr().out.split())
+    assert all(text in shown for text in said)
+
+
 def test_what_switches_is_held_against_readings_that_tell_when(capsys):
     told = content("missing_physics")
     assert "With it the held-out error falls from 0.56 K to 0.24 K" in verdict_sentence(told)
