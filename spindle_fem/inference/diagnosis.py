@@ -49,6 +49,7 @@ from spindle_fem.inference.wrong_definition import (
     defined_number,
     is_beyond_prior,
     known_of,
+    number_beyond_prior,
     suspected_direction,
     suspected_of_calibration,
     with_wrong_definition,
@@ -294,6 +295,10 @@ def diagnose_recordings(
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit
     about_chosen = problems.of(chosen_fit)
+    defined = machine.redefined is None and not machine.is_network and not calibration
+    if wrong is None and defined and judgement.verdict in ("consistent", "sensor"):
+        # Nothing explains the recording, or a sensor does, beside a value that its prior hardly holds.
+        wrong = number_beyond_prior(about_chosen, chosen_fit, tuple(uncertain_numbers(machine.spec)))
     followed = readings.followed(chosen_fit)
     if followed.states and machine.rows:
         finer = readings.with_states(

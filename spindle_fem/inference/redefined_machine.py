@@ -42,7 +42,7 @@ def with_definition_put_right(
     """The machine with the definition that its recordings show, and its diagnosis; else both as they are.
 
     A machine is made anew with another number where one is suspected. That is told where its own calibration
-    says so, or where it makes the recordings twenty times as likely.
+    or the number's own interval says so, or where it makes the recordings twenty times as likely.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _is_told(wrong: WrongDirection, given: Diagnosis, other: DiagnosedMachine, a
     """Whether a definition is wrong, by the machine made anew with another number."""
     if not is_beyond_prior(wrong, other, _telling(wrong, again)):
         return False
-    if wrong.by_calibration:
+    if wrong.by_calibration or wrong.by_interval:
         return True
     odds = log_odds(again.hypotheses, given.hypotheses, wrong.log_prior, given.coarseness)
     return odds >= tuned.LEAST_HELDOUT_GAIN

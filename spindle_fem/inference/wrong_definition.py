@@ -63,6 +63,8 @@ class WrongDirection:
         What held-out readings become likelier by, as a logarithm that counts.
     by_calibration : bool
         Whether the machine's own calibration says so.
+    by_interval : bool
+        Whether its interval says so, whatever else there may be.
     limit : float
         Departure, in widths of the prior, beyond which a definition is not as it says.
     """
@@ -75,6 +77,7 @@ class WrongDirection:
     p_value: float
     told: float = 0.0
     by_calibration: bool = False
+    by_interval: bool = False
     limit: float = PRIOR_SIGMAS
 
     @property
@@ -208,7 +211,7 @@ def number_beyond_prior(
     item, value = freed.items[best], freed.items[best].sigma * float(freed.position[best])
     p_value = _of_any(2.0 * float(ndtr(-nearest[best])), len(freed.items))
     belief = without_prior(problem.belief, freed.rows[best])
-    return WrongDirection(item, belief, value, 0.0, 0.0, p_value, limit=limit)
+    return WrongDirection(item, belief, value, 0.0, 0.0, p_value, by_interval=True, limit=limit)
 
 
 def _limit_of(count: int) -> float:

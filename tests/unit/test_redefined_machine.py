@@ -263,12 +263,13 @@ def test_a_wrong_definition_beside_physics_leaves_the_verdict(spec, machines_mad
     assert found.wrong == (first.suspected,)
 
 
-def test_what_a_calibration_says_needs_no_odds(spec, machines_made):
-    first = diagnosis_of(CONDUCTS, 0.9, by_calibration=True)
-    again = settled(CONDUCTS, 0.0, by_calibration=True)
+@pytest.mark.parametrize(("by", "words"), [("calibration", "the calibration"), ("interval", "the recording")])
+def test_what_a_calibration_or_an_interval_says_needs_no_odds(spec, machines_made, by, words):
+    first = diagnosis_of(CONDUCTS, 0.9, **{f"by_{by}": True})
+    again = settled(CONDUCTS, 0.0, **{f"by_{by}": True})
     _, found = with_definition_put_right(opened(spec), first, lambda machine: again)
     assert found.judgement.verdict == "parameter"
-    assert "the calibration" in found.judgement.reason
+    assert words in found.judgement.reason
 
 
 @pytest.mark.parametrize(("value", "gain"), [(0.0, 7.9), (-0.9, 20.0)])
