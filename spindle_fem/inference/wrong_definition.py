@@ -66,7 +66,8 @@ class WrongDirection:
     by_interval : bool
         Whether its interval says so, whatever else there may be.
     limit : float
-        Departure, in widths of the prior, beyond which a definition is not as it says.
+        Departure, in widths of the prior, beyond which a definition is not as it says; its interval lies
+        beyond ``PRIOR_SIGMAS``.
     """
 
     direction: Misdescription
@@ -194,8 +195,8 @@ def number_beyond_prior(
 ) -> WrongDirection | None:
     """The number with a prior that a fit holds farthest beyond it; None where it holds none there.
 
-    Of a definition that is right all numbers together are as far out in one of a hundred machines. That the
-    interval is, which readings alone leave of it, needs no likelihood of what else there may be.
+    Its value is where the farthest number of a right definition is in one of a hundred machines, its interval
+    by readings alone where its own prior hardly holds it. That needs no likelihood of what else there may be.
     """
     freed = _Freed.of(problem, fit, numbers)
     if not freed.items:
@@ -203,14 +204,16 @@ def number_beyond_prior(
     limit, widths = _limit_of(len(freed.items)), fit.stated_sigmas[freed.rows]
     told = np.maximum(widths**-2.0 - 1.0, 0.0)
     nearest = np.abs(freed.position) - NORMAL_90_PERCENT / np.sqrt(told + WIDER**-2)
+    far = np.abs(freed.position) > limit
     # Where readings hardly tell a number, first order sends it anywhere.
-    nearest[widths >= LEARNED_BELOW] = 0.0
+    nearest[~far | (widths >= LEARNED_BELOW)] = 0.0
     best = int(np.argmax(nearest))
-    if nearest[best] <= limit:
+    if nearest[best] <= PRIOR_SIGMAS:
         return None
-    item, value = freed.items[best], freed.items[best].sigma * float(freed.position[best])
-    p_value = _of_any(2.0 * float(ndtr(-nearest[best])), len(freed.items))
+    item, position = freed.items[best], float(freed.position[best])
+    p_value = _of_any(2.0 * float(ndtr(-abs(position))), len(freed.items))
     belief = without_prior(problem.belief, freed.rows[best])
+    value = item.sigma * position
     return WrongDirection(item, belief, value, 0.0, 0.0, p_value, by_interval=True, limit=limit)
 
 
@@ -400,4 +403,5 @@ def is_beyond_prior(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) 
         *fit.interval(item.coordinate, NORMAL_90_PERCENT, fit.stated_sigmas),
     )
     far = [departure(item, machine, item.amount(value)) / item.sigma for value in values]
-    return min(np.abs(far)) > wrong.limit and np.ptp(np.sign(far)) == 0.0
+    within = min(np.abs(far)) <= PRIOR_SIGMAS or np.ptp(np.sign(far)) > 0.0
+    return abs(far[0]) > wrong.limit and not within
