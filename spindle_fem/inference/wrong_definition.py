@@ -222,18 +222,18 @@ def _limit_of(count: int) -> float:
     return float(-ndtri(0.5 * -np.expm1(np.log1p(-tuned.SIGNIFICANT) / count)))
 
 
-def numbers_far_off(diagnosed: Fit, machine: DiagnosedMachine, wrong: Sequence[WrongDirection]) -> list[str]:
+def numbers_far_off(fit: Fit, machine: DiagnosedMachine, wrong: Sequence[WrongDirection]) -> list[str]:
     """Values with a prior that a fit has farther off than a right definition would, in words.
 
     Those apart that are told to be wrong.
     """
-    known, told = {c.name: c for c in diagnosed.coordinates}, {item.direction.name for item in wrong}
-    numbers = [] if machine.is_network else [i for i in uncertain_numbers(machine.spec) if i.name in known]
+    told, values = {item.direction.name for item in wrong}, fit.values
+    numbers = [] if machine.is_network else list(uncertain_numbers(machine.spec))
     far = []
     for item in numbers:
-        deviations = item.amount(diagnosed.values[item.coordinate]) / item.sigma
+        times = values[item.coordinate]
+        deviations = item.amount(times) / item.sigma
         if item.name not in told and abs(deviations) > _limit_of(len(numbers)):
-            times = diagnosed.values[item.coordinate]
             far.append(
                 f"The fit has {item.key} {times:.2g} times as large as the definition, {abs(deviations):.1f} "
                 "deviations of its prior off: check it"
