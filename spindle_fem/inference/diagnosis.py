@@ -295,10 +295,11 @@ def diagnose_recordings(
     progress("diagnosis: where and when")
     chosen_fit = judgement.chosen.fit
     about_chosen = problems.of(chosen_fit)
-    defined = machine.redefined is None and not machine.is_network and not calibration
-    if wrong is None and defined and judgement.verdict in ("consistent", "sensor"):
+    suspected = None if freed else wrong
+    fresh = machine.redefined is None and not machine.is_network and not calibration
+    if fresh and suspected is None and judgement.verdict in ("consistent", "sensor"):
         # Nothing explains the recording, or a sensor does, beside a value that its prior hardly holds.
-        wrong = number_beyond_prior(about_chosen, chosen_fit, tuple(uncertain_numbers(machine.spec)))
+        suspected = number_beyond_prior(about_chosen, chosen_fit, tuple(uncertain_numbers(machine.spec)))
     followed = readings.followed(chosen_fit)
     if followed.states and machine.rows:
         finer = readings.with_states(
@@ -330,7 +331,7 @@ def diagnose_recordings(
         tried,
         clock.laps,
         told,
-        suspected=None if freed else wrong,
+        suspected=suspected,
         followed=followed,
         notes=notes,
     )

@@ -345,12 +345,20 @@ def _freed(box: Box, belief: Belief, null: Fit, row: int) -> Box:
 
 
 def known_of(predictor: Predictor, redefined: Redefined | None) -> Belief:
-    """Belief before any recording, without the priors of the numbers in which a definition was put right."""
+    """Belief before any recording, the priors given up of the numbers in which a definition was put right.
+
+    What is left of each is about the value that was given, not about the one that is tried.
+    """
     belief = known_before(predictor)
-    names = [c.name for c in belief.coordinates]
-    for wrong in () if redefined is None else redefined.wrong:
-        belief = without_prior(belief, names.index(wrong.direction.coordinate))
-    return belief
+    if redefined is None:
+        return belief
+    names, mean = [c.name for c in belief.coordinates], belief.mean.copy()
+    for item in (wrong.direction for wrong in redefined.wrong):
+        row = names.index(item.coordinate)
+        belief = without_prior(belief, row)
+        given, tried = (defined_number(item, spec).value for spec in (redefined.given, predictor.fast.spec))
+        mean[row] = item.between(tried, given) / item.sigma
+    return replace(belief, mean=mean, begin=belief.start)
 
 
 def without_prior(belief: Belief, row: int) -> Belief:

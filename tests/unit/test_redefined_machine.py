@@ -175,11 +175,17 @@ def test_what_was_put_right_stays_open_as_widely_as_a_wrong_definition(spec, mon
     )
     monkeypatch.setattr(wrong_definition, "known_before", lambda predictor: belief)
     assert known_of(None, None) is belief
-    for row, item in enumerate((MOUNT, share, CONDUCTS)):
-        opened = known_of(None, Redefined(spec, (suspected(item, 0.9),)))
+    for row, (item, value, mean) in enumerate(
+        ((MOUNT, np.log(0.1), np.log(10.0) / 0.5), (share, 0.0, 0.0), (CONDUCTS, np.log(2.0), -0.5 / 0.05))
+    ):
+        tried = SimpleNamespace(fast=SimpleNamespace(spec=item.change.redefined(spec, value)))
+        opened = known_of(tried, Redefined(spec, (suspected(item, 0.9),)))
         widths = np.sqrt(np.diag(np.linalg.inv(opened.root.T @ opened.root)))
         assert widths[row] == pytest.approx(WIDER, rel=0.01)
         assert np.delete(widths, row) == pytest.approx(1.0)
+        # what is left of the prior is about the given value; a fit begins at the one that is tried
+        assert opened.mean[row] == pytest.approx(mean)
+        assert not opened.start.any()
     # a share has its own bound, no factor is a thousand
     bounds = [without_prior(belief, row).coordinates[row] for row in range(3)]
     assert (bounds[1].low, bounds[1].high) == (-WIDER * THETA_BOUND, 2.2)
