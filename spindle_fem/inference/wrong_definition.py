@@ -33,10 +33,9 @@ from spindle_fem.units import NORMAL_90_PERCENT
 
 Array = NDArray[np.float64]
 
-# Width of the prior of what is wrong, in standard deviations of the one that is given up.
-WIDER = 10.0
-# Times by which a number may be too large or too small at most.
-MOST_TIMES_OFF = 1000.0
+# Width of the prior of what is wrong, in standard deviations of the one that is given up; of a factor no more
+# than this many times, one standard deviation: beyond it readings often tell hardly anything.
+WIDER, TIMES_OFF = 10.0, 10.0
 # Distance from a bound at which a coordinate is held by it, in deviations of its prior.
 AT_BOUND = 0.05
 # Effects beside which a wrong definition is looked for, at most.
@@ -131,12 +130,15 @@ class _Freed:
         What the cost falls by.
     position : (n,) ndarray
         Where each goes, in deviations of its prior.
+    widths : (n,) ndarray
+        Of the priors that take the place of those given up, likewise.
     """
 
     items: list[Misdescription]
     rows: list[int]
     misfit: Array
     position: Array
+    widths: Array
 
     @classmethod
     def of(cls, problem: Problem, null: Fit, directions: Sequence[Misdescription]) -> _Freed:
@@ -154,7 +156,8 @@ class _Freed:
         freed = [_least(_freed(box, belief, null, row)) for row in rows]
         misfit = [settled - cost for cost, _ in freed]
         position = [null.position[row] + move[row] for row, (_, move) in zip(rows, freed, strict=True)]
-        return cls(items, rows, np.array(misfit), np.array(position))
+        widths = [_width(belief.coordinates[row]) for row in rows]
+        return cls(items, rows, np.array(misfit), np.array(position), np.array(widths))
 
 
 def wrong_direction(
@@ -162,7 +165,7 @@ def wrong_direction(
 ) -> WrongDirection | None:
     """The direction whose prior had best be given up; None where there are no directions.
 
-    An offset of the prior's mean in one direction, itself normal with the width ``WIDER``, lowers the cost of
+    An offset of the prior's mean in one direction, itself normal and many times as wide, lowers the cost of
     a fit with nothing missing, to first order in the coordinates and between their bounds. Its complexity is
     that of ``h``, what is left of the prior's curvature there once everything else follows.
 
@@ -182,7 +185,11 @@ def wrong_direction(
     left = np.diag(precision - precision @ null.covariance[:size, :size] @ precision)[freed.rows]
     left = np.maximum(left, 0.0)
     prior = np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(count + trials)
-    gains = 0.5 * freed.misfit / (coarseness * tuned.GAIN_DIVISOR) - 0.5 * np.log1p(WIDER**2 * left) + prior
+    gains = (
+        0.5 * freed.misfit / (coarseness * tuned.GAIN_DIVISOR)
+        - 0.5 * np.log1p(freed.widths**2 * left)
+        + prior
+    )
     best = int(np.argmax(gains))
     level = float(chdtrc(1, freed.misfit[best] / (coarseness * tuned.CHANCE_DIVISOR)))
     item, value = freed.items[best], freed.items[best].sigma * float(freed.position[best])
@@ -203,7 +210,7 @@ def number_beyond_prior(
         return None
     limit, widths = _limit_of(len(freed.items)), fit.stated_sigmas[freed.rows]
     told = np.maximum(widths**-2.0 - 1.0, 0.0)
-    nearest = np.abs(freed.position) - NORMAL_90_PERCENT / np.sqrt(told + WIDER**-2)
+    nearest = np.abs(freed.position) - NORMAL_90_PERCENT / np.sqrt(told + freed.widths**-2.0)
     far = np.abs(freed.position) > limit
     # Where readings hardly tell a number, first order sends it anywhere.
     nearest[~far | (widths >= LEARNED_BELOW)] = 0.0
@@ -320,11 +327,14 @@ def _least(box: Box) -> tuple[float, Array]:
     return box.cost + float(move @ (box.hessian @ move)) - 2.0 * float(box.downhill @ move), move
 
 
+def _width(coordinate: Coordinate) -> float:
+    """Width of the prior that takes the place of one given up, in deviations of that."""
+    return min(WIDER, float(np.log(TIMES_OFF)) / coordinate.sigma) if coordinate.logarithmic else WIDER
+
+
 def _wider(coordinate: Coordinate) -> tuple[float, float]:
     """Bounds of a coordinate whose prior is given up; those that have another reason stay."""
-    bound = THETA_BOUND * WIDER
-    if coordinate.logarithmic:
-        bound = min(bound, float(np.log(MOST_TIMES_OFF)) / coordinate.sigma)
+    bound = THETA_BOUND * _width(coordinate)
     low = -bound if coordinate.low <= -THETA_BOUND else coordinate.low
     return low, bound if coordinate.high >= THETA_BOUND else coordinate.high
 
@@ -333,7 +343,9 @@ def _freed(box: Box, belief: Belief, null: Fit, row: int) -> Box:
     """A box about a fit with the prior of one coordinate given up, as :func:`without_prior` has it."""
     precision = belief.root.T @ belief.root
     departure = null.position[: len(precision)] - belief.mean
-    less = np.outer(precision[row], precision[row]) / (precision[row, row] + WIDER**-2)
+    less = np.outer(precision[row], precision[row]) / (
+        precision[row, row] + _width(belief.coordinates[row]) ** -2
+    )
     hessian, downhill = box.hessian.copy(), box.downhill.copy()
     hessian[: len(less), : len(less)] -= less
     downhill[: len(less)] += less @ departure
@@ -362,9 +374,9 @@ def known_of(predictor: Predictor, redefined: Redefined | None) -> Belief:
 
 
 def without_prior(belief: Belief, row: int) -> Belief:
-    """The belief with another ``WIDER`` standard deviations of one coordinate, and bounds as much wider."""
+    """The belief with many more standard deviations of one coordinate, and bounds as much wider."""
     unit = np.zeros(len(belief.mean))
-    unit[row] = WIDER
+    unit[row] = _width(belief.coordinates[row])
     covariance = np.linalg.inv(belief.root.T @ belief.root) + np.outer(unit, unit)
     precision = np.linalg.inv(covariance)
     root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
