@@ -159,6 +159,12 @@ class _Freed:
         widths = [_width(belief.coordinates[row]) for row in rows]
         return cls(items, rows, np.array(misfit), np.array(position), np.array(widths))
 
+    def only(self, wanted: Sequence[Misdescription]) -> _Freed:
+        """Some of them."""
+        kept = [k for k, item in enumerate(self.items) if item in wanted]
+        items, rows = ([own[k] for k in kept] for own in (self.items, self.rows))
+        return _Freed(items, rows, self.misfit[kept], self.position[kept], self.widths[kept])
+
 
 def wrong_direction(
     problem: Problem, null: Fit, directions: Sequence[Misdescription], trials: int, coarseness: float = 1.0
@@ -176,7 +182,13 @@ def wrong_direction(
     trials : int
         Candidates that might explain the recording instead: each as likely beforehand as one direction.
     """
-    freed = _Freed.of(problem, null, directions)
+    return _likeliest(_Freed.of(problem, null, directions), problem, null, trials, coarseness)
+
+
+def _likeliest(
+    freed: _Freed, problem: Problem, null: Fit, trials: int, coarseness: float = 1.0
+) -> WrongDirection | None:
+    """As :func:`wrong_direction`, of directions whose fits are known."""
     if not freed.items:
         return None
     belief, count = problem.belief, len(freed.items)
@@ -205,7 +217,11 @@ def number_beyond_prior(
     Its value is where the farthest number of a right definition is in one of a hundred machines, its interval
     by readings alone where its own prior hardly holds it. That needs no likelihood of what else there may be.
     """
-    freed = _Freed.of(problem, fit, numbers)
+    return _farthest(_Freed.of(problem, fit, numbers), problem, fit)
+
+
+def _farthest(freed: _Freed, problem: Problem, fit: Fit) -> WrongDirection | None:
+    """As :func:`number_beyond_prior`, of numbers whose fits are known."""
     if not freed.items:
         return None
     limit, widths = _limit_of(len(freed.items)), fit.stated_sigmas[freed.rows]
@@ -303,12 +319,13 @@ def suspected_of_calibration(
     told = [item for item in every if defined_number(item, machine.spec) is not None]
     # What is held at its bound would go further: first order undervalues it, and others stand in for it.
     held = [item for item in told if _is_held(problem, fit, item)]
-    wrong = wrong_direction(problem, fit, held or every, 0)
+    freed = _Freed.of(problem, fit, every)
+    wrong = _likeliest(freed.only(held) if held else freed, problem, fit, 0)
     if wrong is not None and wrong.direction in told:
         # One of those that may be told: the others count for nothing.
-        wrong = wrong_direction(problem, fit, held or told, 0)
+        wrong = _likeliest(freed.only(held or told), problem, fit, 0)
     if wrong is None or wrong.direction not in told or not wrong.is_beyond_chance:
-        wrong = number_beyond_prior(problem, fit, numbers)
+        wrong = _farthest(freed.only(numbers), problem, fit)
     return None if wrong is None else replace(wrong, by_calibration=True)
 
 
