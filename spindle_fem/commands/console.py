@@ -254,14 +254,14 @@ def print_diagnosis(content: dict[str, Any], folder: Path) -> None:
     from spindle_fem.report import diagnosis_words as words
 
     console = open_console()
-    fit, p = content["fit"], words.level_of(content)
-    _print_marked(console, content["verdict"], f"  (p {p})" if p else "", "bold")
+    fit, p, verdict = content["fit"], words.level_of(content), content["verdict"]
+    _print_marked(console, verdict, f"  (p {p})" if p else "", "bold")
     if content["reason"]:
         console.print(content["reason"])
+    lead = "Comes nearest: " if verdict == "unexplained" else ""
     for finding in content["findings"]:
-        lead = "Comes nearest: " if content["verdict"] == "unexplained" else ""
         console.print(f"{lead}{finding['statement']}  (set: {content['set_probability']:.2f})")
-    for row in words.wrong_rows(content) if content["findings"] else ():
+    for row in words.wrong_rows(content) if content["findings"] or verdict == "unexplained" else ():
         console.print(words.wrong_definition_words(row))
     if content["alternatives"]:
         table = headed_table("Not ruled out", "set", "probability", sentences=True)

@@ -36,14 +36,15 @@ def verdict_sentence(content: Mapping[str, Any]) -> str:
     off = "".join(f"{wrong_definition_words(row)} " for row in wrong_rows(content))
     if verdict == "unexplained" and not content["findings"]:
         reason = str(content.get("reason") or "the difference follows nothing that the catalogue holds")
-        return f"The difference between recording and model is not explained: {reason.rstrip('.')}."
+        unexplained = f"The difference between recording and model is not explained: {reason.rstrip('.')}."
+        return f"{unexplained} {off}".rstrip()
     if verdict == "unexplained":
         reason = str(content.get("reason") or "the best set leaves too much").rstrip(".")
         statements = " ".join(item["statement"] for item in content["findings"])
         return (
             f"The difference between recording and model is not explained: {reason}. What comes nearest, "
             f"and is not to be taken for the cause (probability {chance(content.get('set_probability'))}): "
-            f"“{statements}” {_improvement(fit)}"
+            f"“{statements}” {off}{_improvement(fit)}"
         )
     if verdict == "consistent":
         others = [

@@ -62,12 +62,16 @@ def test_findings_of_a_verdict_without_explanation_are_no_statements(verdict, ca
     assert ("Comes nearest: 312 W" in capsys.readouterr().out) == unexplained
 
 
-def test_every_wrong_number_of_a_definition_is_said_beside_what_is_missing(capsys):
+@pytest.mark.parametrize(
+    ("verdict", "found"), [("missing_physics", 1), ("unexplained", 1), ("unexplained", 0)]
+)
+def test_every_wrong_number_of_a_definition_is_said_whatever_else_is(verdict, found, capsys):
     def number(key, given):
         defined = {"given": given, "value": 2.0 * given, "low": given, "high": 3.0 * given, "unit": "mm"}
         return {"key": key, "defined": defined}
 
-    told = content("missing_physics")
+    told = content(verdict)
+    told["findings"] = told["findings"][:found]
     told["misdescription"] = {
         "wrong": number("channel.depth", 3.0),
         "also_wrong": [number("channel.z_start", 50.0)],
