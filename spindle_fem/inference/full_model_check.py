@@ -28,7 +28,12 @@ from spindle_fem.inference.findings import (
     fitted_and_heldout_errors,
     predictions_at_stamps,
 )
-from spindle_fem.inference.full_model_confirmation import left_by_both
+from spindle_fem.inference.full_model_confirmation import (
+    CONFIRMED,
+    LINEAR_SHARE,
+    confirmed_share,
+    left_by_both,
+)
 from spindle_fem.inference.full_model_runs import (
     FullFit,
     MeshRuns,
@@ -69,6 +74,8 @@ FIRST_ORDER_NOTE = (
     "where probes sit within their holes, how the machine differs from its definition, and what happened "
     "within gaps, as the reduced model has them"
 )
+# What a run is called of the machine that a set belongs to, with nothing missing.
+WITHOUT_SET = "after, without what was found"
 NETWORK_REASON = "The machine is a network: it has no finite-element model."
 
 Keep = Callable[[str, tuple[Array, ...]], None]
@@ -301,7 +308,18 @@ def _both_fits(
         reduced[name] = predictions_at_stamps(predictor, fit)
         apart[name] = [a - b for a, b in zip(full.predicted, reduced[name], strict=True)]
     predictor = diagnosis.predictor
-    left = left_by_both(predictor, reduced, {name: full.predicted for name, full in runs.items()})
+    least_share = LINEAR_SHARE if prepared.spec.mesh.order == 1 else 0.0
+    meshed = {name: full.predicted for name, full in runs.items()}
+    left = left_by_both(predictor, reduced, meshed, least_share)
+    if not same and confirmed_share(*left) < CONFIRMED:
+        # Both fits read alike by other parameters: a mesh may be apart from the fast model by more of one of
+        # them. Of the machine with the set it is asked what the set alone changes.
+        fit = diagnosis.stated_fit.without_candidates
+        (bare,) = _runs(
+            {WITHOUT_SET: (predictor, fit)}, {WITHOUT_SET: begun[1]}, options, mesh, progress
+        ).values()
+        reduced["before"], meshed["before"] = predictions_at_stamps(predictor, fit), bare.predicted
+        left = left_by_both(predictor, reduced, meshed, least_share)
     supplied = any(n.startswith(FIRST_ORDER) for _, fit in fits.values() for n in fit.values)
     return {
         "mesh": mesh,

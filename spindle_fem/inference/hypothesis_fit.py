@@ -115,6 +115,18 @@ class Fit:
         return frozenset(c.key for c in self.named)
 
     @property
+    def without_candidates(self) -> Fit:
+        """The same machine with nothing missing; its misfit and evidence stay those of the fit."""
+        size = len(self.known.coordinates)
+        return replace(
+            self,
+            candidates=(),
+            coordinates=self.coordinates[:size],
+            position=self.position[:size],
+            covariance=self.covariance[:size, :size],
+        )
+
+    @property
     def reduced_misfit(self) -> float:
         """Misfit for each datum."""
         return self.misfit / max(len(self.residual), 1)

@@ -369,6 +369,43 @@ def test_a_difference_of_the_meshes_is_not_one_of_what_was_found(predictor, monk
         assert [row[f"{key}_K"] for key in ("before", "after", "change")] == pytest.approx([0.4, 0.5, 0.1])
 
 
+@pytest.mark.parametrize(("share", "confirmed"), [(1.0, True), (0.5, False)])
+def test_a_set_is_held_against_its_own_machine_where_the_mesh_reads_another_machine_otherwise(
+    predictor, candidates, monkeypatch, share, confirmed
+):
+    """A mesh that cools the machine of a set more than the fast model does, with the set and without it."""
+    heat = candidates["unrecorded_heat_source", "housing"]
+    # the film takes up, with nothing missing, what the set explains
+    nothing, other = fit_of((), {"coolant.film_factor": 0.8}), {"coolant.film_factor": 1.5}
+    found = fit_of((heat,), other | {heat.amplitude: 200.0})
+    found.without_candidates = fit_of((), other)
+    ran = []
+
+    def run_fit(machine, predictor, fit, options):
+        ran.append(fit)
+        film = {name: value for name, value in fit.values.items() if name in other}
+        (bare,) = predictions_at_stamps(predictor, fit_of((), film))
+        (whole,) = predictions_at_stamps(predictor, fit)
+        colder = 0.0 if fit is nothing else -0.2 * (bare - bare[0])
+        return full_model.FullFit((bare + colder + share * (whole - bare),), 7, 1.0)
+
+    (truth,) = predictions_at_stamps(predictor, found)
+    read = replace(predictor.recordings[0], temperature=truth)
+    seen = Predictor(predictor.fast, [read], [np.ones(len(truth), dtype=bool)])
+    prepared = SimpleNamespace(
+        spec=SimpleNamespace(mesh=SimpleNamespace(preset="coarse", order=1)),
+        operators=SimpleNamespace(n_unknowns=3),
+    )
+    monkeypatch.setattr(full_model, "prepare_machine", lambda spec: prepared)
+    monkeypatch.setattr(full_model, "run_fit", run_fit)
+    monkeypatch.setattr(full_model, "thread_count", lambda: 1)
+    machine = SimpleNamespace(is_network=False, spec=predictor.fast.spec)
+    left = full_model_errors(diagnosis_of(seen, nothing, found), machine)["left"]
+    assert ran == [nothing, found, found.without_candidates]
+    assert left["fast"] < 0.1
+    assert (left["full"] < 1.0) == confirmed
+
+
 def test_recorded_heat_goes_into_the_full_model(predictor):
     drive = predictor.drives[0]
     heat = np.full((len(drive.start), 1), 40.0)
