@@ -93,9 +93,14 @@ class Conductivity:
 
     material: str
 
+    @property
+    def parameter(self) -> str:
+        """Its coefficient."""
+        return f"conductivity.{self.material}"
+
     def __call__(self, base: BaseRun) -> Change:
         """Loads of what it conducts more, for as much again."""
-        return _more(base, (f"conductivity.{self.material}",), 1.0, 1.0)
+        return _more(base, (self.parameter,), 1.0, 1.0)
 
     def corrected(self, spec: MachineSpec, value: float) -> MachineSpec:
         """The machine with the conductivity that it has."""
@@ -104,6 +109,10 @@ class Conductivity:
     def quantity(self, spec: MachineSpec) -> Reported:
         """Its conductivity."""
         return Reported(spec.materials[self.material].thermal_conductivity, "W/(m·K)")
+
+    def of_factor(self, factor: float) -> float:
+        """Its logarithm."""
+        return float(np.log(factor))
 
     def redefined(self, spec: MachineSpec, value: float) -> MachineSpec:
         """The machine with another conductivity.

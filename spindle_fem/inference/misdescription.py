@@ -53,6 +53,18 @@ class Redefinable(Protocol):
         """The machine with that number changed by what a fit to first order found."""
 
 
+@runtime_checkable
+class Factored(Redefinable, Protocol):
+    """A number of the definition that the model takes as a factor, by far as well."""
+
+    @property
+    def parameter(self) -> str:
+        """The model's name of the factor."""
+
+    def of_factor(self, factor: float) -> float:
+        """What :meth:`redefined` takes where the number is larger by a factor."""
+
+
 @dataclass(frozen=True, slots=True)
 class Misdescription:
     """One direction of misdescription.
@@ -81,6 +93,8 @@ class Misdescription:
     delays : str
         Channel that it makes late, or ``EVERY_CHANNEL``, where it does so; of a channel, by much that is an
         effect of the catalogue.
+    stands_for : int
+        Values of the definition that it changes together.
     """
 
     name: str
@@ -92,6 +106,7 @@ class Misdescription:
     recording: int | None = None
     of_sensor: bool = False
     delays: str = ""
+    stands_for: int = 1
 
     @property
     def coordinate(self) -> str:
@@ -105,12 +120,15 @@ class Misdescription:
         return fitted
 
     def between(self, given: float, found: float) -> float:
-        """How far a number of the definition goes from one value to another, as the prior's width counts."""
-        return found - given if self.unit else found / given - 1.0
+        """How far a number of the definition goes from one value to another, as the prior's width counts.
+
+        Of a share in its logarithm: a quarter is as far off as four times.
+        """
+        return found - given if self.unit else float(np.log(found / given))
 
     def told(self, departure: float) -> float:
         """A departure that :meth:`between` gives, as it is told: in the unit, or as a share."""
-        return departure
+        return departure if self.unit else float(np.expm1(departure))
 
 
 def delays_in(number: int, directions: Sequence[Misdescription]) -> dict[str, str]:

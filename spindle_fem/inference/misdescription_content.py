@@ -13,7 +13,7 @@ from spindle_fem.inference.misdescription import EVERY_CHANNEL, Misdescription
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.uncertain_numbers import UncertainNumber
-from spindle_fem.inference.wrong_definition import defined_number, departure
+from spindle_fem.inference.wrong_definition import Rival, defined_number, departure
 from spindle_fem.units import NORMAL_90_PERCENT
 
 # Directions that are listed: those moved by this many standard deviations of their priors, so many at most.
@@ -35,11 +35,16 @@ def misdescription_content(diagnosis: Diagnosis, machine: DiagnosedMachine) -> d
         of the fit with nothing missing: what would have to hold if nothing of the found were there; empty
         when nothing was found), ``measure`` (the direction that is worth measuring most, and why; None where
         none moves), ``wrong`` (the row of a definition that is wrong, with ``defined`` where a number of the
-        definition is: ``given``, ``value``, ``low``, ``high`` and ``unit``; None else).
+        definition is: ``given``, ``value``, ``low``, ``high`` and ``unit``; with ``rivals``, rows of numbers
+        that explain a calibration nearly as well: ``key``, ``name``, ``given``, ``value`` and ``unit``; None
+        else), ``also_wrong`` (further such rows).
     """
     final, null = (diagnosis.predictor, diagnosis.stated_fit), (diagnosis.unchanged, diagnosis.null)
     found = bool(diagnosis.final.candidates)
-    wrong = [_wrong_row(*final, item.direction, machine) for item in diagnosis.wrong]
+    wrong = [
+        _wrong_row(*final, item.direction, machine) | {"rivals": [_rival_row(each) for each in item.rivals]}
+        for item in diagnosis.wrong
+    ]
     wrong.sort(key=lambda row: -abs(row["sigmas"]))
     return {
         "directions": len(diagnosis.predictor.misdescribed),
@@ -75,6 +80,16 @@ def _wrong_row(
         for key, value in fitted.items():
             row["defined"][key] = defined_number(item, machine.spec, value).value
     return row
+
+
+def _rival_row(rival: Rival) -> dict[str, Any]:
+    return {
+        "key": rival.direction.key,
+        "name": rival.direction.name,
+        "given": rival.given.value,
+        "value": rival.value.value,
+        "unit": rival.value.unit,
+    }
 
 
 def _row(predictor: Predictor, fit: Fit, item: Misdescription, sigmas: np.ndarray) -> dict[str, Any]:

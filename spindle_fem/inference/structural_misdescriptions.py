@@ -76,6 +76,15 @@ class MaterialCapacity(StructuralChange):
 
     material: str = ""
 
+    @property
+    def parameter(self) -> str:
+        """Its part of the storage."""
+        return CAPACITY + self.material
+
+    def of_factor(self, factor: float) -> float:
+        """The share of a larger one, of a smaller one the logarithm."""
+        return factor - 1.0 if factor > 1.0 else float(np.log(factor))
+
     def corrected(self, spec: MachineSpec, value: float) -> MachineSpec:
         """The machine with the capacity that it has."""
         return with_material(spec, self.material, "specific_heat_capacity", 1.0 + value)

@@ -17,6 +17,8 @@ from spindle_fem.definition.uncertain_parameters import (
 from spindle_fem.effects.framework.effect import Reported
 from spindle_fem.inference.misdescription import Change, Misdescription
 
+# Factor on the heat capacities of all materials.
+EVERY_CAPACITY = "heat_capacity_factor"
 # Units as a report has them.
 TOLD_IN = {"W/m**2/K": "W/(m²·K)"}
 
@@ -44,6 +46,10 @@ class Scaled:
         value, unit = coefficient_value(spec, self.coefficient)
         return Reported(value, TOLD_IN.get(unit, unit))
 
+    def of_factor(self, factor: float) -> float:
+        """Its logarithm."""
+        return float(np.log(factor))
+
     def redefined(self, spec: MachineSpec, value: float) -> MachineSpec:
         """The machine with all values that the parameter multiplies changed by a factor."""
         return with_parameters(spec, {self.parameter: float(np.exp(value))})
@@ -62,18 +68,12 @@ class UncertainNumber(Misdescription):
         """The logarithm of a fitted factor."""
         return float(np.log(fitted))
 
-    def between(self, given: float, found: float) -> float:
-        """The logarithm of their ratio, in which the prior is normal."""
-        return float(np.log(found / given))
-
-    def told(self, departure: float) -> float:
-        """A logarithm as a share."""
-        return float(np.expm1(departure))
-
 
 def uncertain_numbers(spec: MachineSpec) -> Iterator[UncertainNumber]:
     """Every uncertain parameter of a machine with geometry."""
     for item in uncertain_parameters(spec):
         keys = ", ".join(item.keys)
-        change = Scaled(item.name, item.applies_to[0])
-        yield UncertainNumber(item.name, keys, "", item.sigma_log, f"share by which {keys} is larger", change)
+        change, statement = Scaled(item.name, item.applies_to[0]), f"share by which {keys} is larger"
+        # The heat capacity of every material is multiplied by one.
+        values = len(spec.materials) if item.name == EVERY_CAPACITY else len(item.keys)
+        yield UncertainNumber(item.name, keys, "", item.sigma_log, statement, change, stands_for=values)

@@ -17,11 +17,11 @@ from scipy.special import chdtrc, ndtr, ndtri
 from spindle_fem.definition.machine_spec import MachineSpec
 from spindle_fem.effects.framework.effect import Reported, quantity
 from spindle_fem.inference import tuned
-from spindle_fem.inference.belief import THETA_BOUND, Belief, Coordinate
+from spindle_fem.inference.belief import Belief
 from spindle_fem.inference.calibration import LEARNED_BELOW
+from spindle_fem.inference.freed_priors import Freed, without_prior
 from spindle_fem.inference.hypothesis import Hypothesis
 from spindle_fem.inference.hypothesis_fit import Fit, Problem
-from spindle_fem.inference.linearised_fit import Box, LinearProblem, bounded_minimum
 from spindle_fem.inference.misdescription import Misdescription, Redefinable
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
@@ -33,13 +33,30 @@ from spindle_fem.units import NORMAL_90_PERCENT
 
 Array = NDArray[np.float64]
 
-# Width of the prior of what is wrong, in standard deviations of the one that is given up; of a factor no more
-# than this many times, one standard deviation: beyond it readings often tell hardly anything.
-WIDER, TIMES_OFF = 10.0, 10.0
 # Distance from a bound at which a coordinate is held by it, in deviations of its prior.
 AT_BOUND = 0.05
 # Effects beside which a wrong definition is looked for, at most.
 MOST_BESIDE = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """Another number of a definition that would explain its recordings nearly as well.
+
+    Attributes
+    ----------
+    given, value : Reported
+        As the definition has it, and as it would be instead.
+    """
+
+    direction: Misdescription
+    given: Reported
+    value: Reported
+
+    @property
+    def statement(self) -> str:
+        """In words."""
+        return f"{self.direction.key}, {quantity(self.value)} for {quantity(self.given)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +84,8 @@ class WrongDirection:
     limit : float
         Departure, in widths of the prior, beyond which a definition is not as it says; its interval lies
         beyond ``PRIOR_SIGMAS``.
+    rivals : tuple of Rival
+        Likeliest first.
     """
 
     direction: Misdescription
@@ -79,6 +98,7 @@ class WrongDirection:
     by_calibration: bool = False
     by_interval: bool = False
     limit: float = PRIOR_SIGMAS
+    rivals: tuple[Rival, ...] = ()
 
     @property
     def is_beyond_chance(self) -> bool:
@@ -116,56 +136,6 @@ def departure(item: Misdescription, machine: DiagnosedMachine, value: float) -> 
     return value if before is None or after is None else item.between(before.value, after.value)
 
 
-@dataclass(frozen=True, slots=True)
-class _Freed:
-    """Fits about one, to first order, each with the prior of one direction given up.
-
-    Attributes
-    ----------
-    items : list of Misdescription
-        Those that are free in the fit and belong to the machine.
-    rows : list of int
-        Their coordinates.
-    misfit : (n,) ndarray
-        What the cost falls by.
-    position : (n,) ndarray
-        Where each goes, in deviations of its prior.
-    widths : (n,) ndarray
-        Of the priors that take the place of those given up, likewise.
-    """
-
-    items: list[Misdescription]
-    rows: list[int]
-    misfit: Array
-    position: Array
-    widths: Array
-
-    @classmethod
-    def of(cls, problem: Problem, null: Fit, directions: Sequence[Misdescription]) -> _Freed:
-        """About a fit of that problem."""
-        belief = problem.belief
-        names = [c.name for c in belief.coordinates]
-        items = [
-            item
-            for item in directions
-            if item.recording is None and not item.of_sensor and item.coordinate in names
-        ]
-        rows = [names.index(item.coordinate) for item in items]
-        box = LinearProblem.about(problem, null).box
-        settled, _ = _least(box)
-        freed = [_least(_freed(box, belief, null, row)) for row in rows]
-        misfit = [settled - cost for cost, _ in freed]
-        position = [null.position[row] + move[row] for row, (_, move) in zip(rows, freed, strict=True)]
-        widths = [_width(belief.coordinates[row]) for row in rows]
-        return cls(items, rows, np.array(misfit), np.array(position), np.array(widths))
-
-    def only(self, wanted: Sequence[Misdescription]) -> _Freed:
-        """Some of them."""
-        kept = [k for k, item in enumerate(self.items) if item in wanted]
-        items, rows = ([own[k] for k in kept] for own in (self.items, self.rows))
-        return _Freed(items, rows, self.misfit[kept], self.position[kept], self.widths[kept])
-
-
 def wrong_direction(
     problem: Problem, null: Fit, directions: Sequence[Misdescription], trials: int, coarseness: float = 1.0
 ) -> WrongDirection | None:
@@ -182,31 +152,37 @@ def wrong_direction(
     trials : int
         Candidates that might explain the recording instead: each as likely beforehand as one direction.
     """
-    return _likeliest(_Freed.of(problem, null, directions), problem, null, trials, coarseness)
+    return _likeliest(Freed.of(problem, null, directions), problem, null, trials, coarseness)
 
 
 def _likeliest(
-    freed: _Freed, problem: Problem, null: Fit, trials: int, coarseness: float = 1.0
+    freed: Freed, problem: Problem, null: Fit, trials: int, coarseness: float = 1.0
 ) -> WrongDirection | None:
     """As :func:`wrong_direction`, of directions whose fits are known."""
     if not freed.items:
         return None
-    belief, count = problem.belief, len(freed.items)
-    size = len(belief.coordinates)
-    precision = belief.root.T @ belief.root
-    left = np.diag(precision - precision @ null.covariance[:size, :size] @ precision)[freed.rows]
-    left = np.maximum(left, 0.0)
-    prior = np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(count + trials)
-    gains = (
-        0.5 * freed.misfit / (coarseness * tuned.GAIN_DIVISOR)
-        - 0.5 * np.log1p(freed.widths**2 * left)
-        + prior
-    )
+    gains = _gains(freed, problem, null, trials, coarseness)
     best = int(np.argmax(gains))
     level = float(chdtrc(1, freed.misfit[best] / (coarseness * tuned.CHANCE_DIVISOR)))
     item, value = freed.items[best], freed.items[best].sigma * float(freed.position[best])
-    belief = without_prior(belief, freed.rows[best])
-    return WrongDirection(item, belief, value, float(gains[best]), float(prior), _of_any(level, count))
+    belief, p_value = without_prior(problem.belief, freed.rows[best]), _of_any(level, len(gains))
+    return WrongDirection(item, belief, value, float(gains[best]), _log_prior(freed, trials), p_value)
+
+
+def _gains(freed: Freed, problem: Problem, null: Fit, trials: int, coarseness: float = 1.0) -> Array:
+    """What data become likelier by without the prior of each direction, complexity and priors included."""
+    size = len(problem.belief.coordinates)
+    precision = problem.belief.root.T @ problem.belief.root
+    left = np.diag(precision - precision @ null.covariance[:size, :size] @ precision)[freed.rows]
+    complexity = 0.5 * np.log1p(freed.widths**2 * np.maximum(left, 0.0))
+    # What stands for several values of a definition is off only where all of them are.
+    likely = _log_prior(freed, trials) - np.log([item.stands_for for item in freed.items])
+    return 0.5 * freed.misfit / (coarseness * tuned.GAIN_DIVISOR) - complexity + likely
+
+
+def _log_prior(freed: Freed, trials: int) -> float:
+    """Of one direction among all of them and all effects, over none."""
+    return float(np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(len(freed.items) + trials))
 
 
 def number_beyond_prior(
@@ -217,10 +193,10 @@ def number_beyond_prior(
     Its value is where the farthest number of a right definition is in one of a hundred machines, its interval
     by readings alone where its own prior hardly holds it. That needs no likelihood of what else there may be.
     """
-    return _farthest(_Freed.of(problem, fit, numbers), problem, fit)
+    return _farthest(Freed.of(problem, fit, numbers), problem, fit)
 
 
-def _farthest(freed: _Freed, problem: Problem, fit: Fit) -> WrongDirection | None:
+def _farthest(freed: Freed, problem: Problem, fit: Fit) -> WrongDirection | None:
     """As :func:`number_beyond_prior`, of numbers whose fits are known."""
     if not freed.items:
         return None
@@ -296,9 +272,11 @@ def suspected_direction(
         if size <= MOST_BESIDE and score > likeliest.get(size, (-np.inf, None))[0]:
             likeliest[size] = score, item.fit
     for size, (score, fit) in likeliest.items():
-        wrong = wrong_direction(problem, fit, directions, trials, coarseness)
+        freed = Freed.of(problem, fit, directions)
+        wrong = _likeliest(freed, problem, fit, trials, coarseness)
         if wrong is None or score + wrong.log_gain <= most:
             continue
+        wrong = _likeliest(freed.fitted(problem, fit), problem, fit, trials, coarseness)
         if size and not (wrong.is_beyond_chance and defined_number(wrong.direction, spec) is not None):
             continue
         most, found = score + wrong.log_gain, wrong
@@ -319,14 +297,31 @@ def suspected_of_calibration(
     told = [item for item in every if defined_number(item, machine.spec) is not None]
     # What is held at its bound would go further: first order undervalues it, and others stand in for it.
     held = [item for item in told if _is_held(problem, fit, item)]
-    freed = _Freed.of(problem, fit, every)
+    freed = Freed.of(problem, fit, every).fitted(problem, fit)
     wrong = _likeliest(freed.only(held) if held else freed, problem, fit, 0)
     if wrong is not None and wrong.direction in told:
         # One of those that may be told: the others count for nothing.
         wrong = _likeliest(freed.only(held or told), problem, fit, 0)
     if wrong is None or wrong.direction not in told or not wrong.is_beyond_chance:
         wrong = _farthest(freed.only(numbers), problem, fit)
+    else:
+        wrong = replace(wrong, rivals=_rivals(wrong, freed.only(told), problem, fit, machine.spec))
     return None if wrong is None else replace(wrong, by_calibration=True)
+
+
+def _rivals(
+    wrong: WrongDirection, freed: Freed, problem: Problem, fit: Fit, spec: MachineSpec
+) -> tuple[Rival, ...]:
+    """Numbers that explain a calibration, and are no twenty times less likely to be what is wrong."""
+    gains = _gains(freed, problem, fit, 0)
+    found = []
+    for k in np.argsort(-gains):
+        item, value = freed.items[k], freed.items[k].sigma * float(freed.position[k])
+        if gains[k] <= max(0.0, wrong.log_gain - tuned.LEAST_HELDOUT_GAIN):
+            break
+        if item is not wrong.direction:
+            found.append(Rival(item, defined_number(item, spec), defined_number(item, spec, value)))
+    return tuple(found)
 
 
 def _is_held(problem: Problem, fit: Fit, item: Misdescription) -> bool:
@@ -336,41 +331,6 @@ def _is_held(problem: Problem, fit: Fit, item: Misdescription) -> bool:
         return False
     coordinate, position = problem.belief.coordinates[own], fit.position[own]
     return min(position - coordinate.low, coordinate.high - position) < AT_BOUND
-
-
-def _least(box: Box) -> tuple[float, Array]:
-    """Least cost within a box, and the move to it."""
-    move = bounded_minimum(box.hessian, box.downhill, box.low, box.high)
-    return box.cost + float(move @ (box.hessian @ move)) - 2.0 * float(box.downhill @ move), move
-
-
-def _width(coordinate: Coordinate) -> float:
-    """Width of the prior that takes the place of one given up, in deviations of that."""
-    return min(WIDER, float(np.log(TIMES_OFF)) / coordinate.sigma) if coordinate.logarithmic else WIDER
-
-
-def _wider(coordinate: Coordinate) -> tuple[float, float]:
-    """Bounds of a coordinate whose prior is given up; those that have another reason stay."""
-    bound = THETA_BOUND * _width(coordinate)
-    low = -bound if coordinate.low <= -THETA_BOUND else coordinate.low
-    return low, bound if coordinate.high >= THETA_BOUND else coordinate.high
-
-
-def _freed(box: Box, belief: Belief, null: Fit, row: int) -> Box:
-    """A box about a fit with the prior of one coordinate given up, as :func:`without_prior` has it."""
-    precision = belief.root.T @ belief.root
-    departure = null.position[: len(precision)] - belief.mean
-    less = np.outer(precision[row], precision[row]) / (
-        precision[row, row] + _width(belief.coordinates[row]) ** -2
-    )
-    hessian, downhill = box.hessian.copy(), box.downhill.copy()
-    hessian[: len(less), : len(less)] -= less
-    downhill[: len(less)] += less @ departure
-    low, high = box.low.copy(), box.high.copy()
-    least, most = _wider(belief.coordinates[row])
-    low[row], high[row] = least - null.position[row], most - null.position[row]
-    cost = box.cost - float(departure @ less @ departure)
-    return replace(box, hessian=hessian, downhill=downhill, low=low, high=high, cost=cost)
 
 
 def known_of(predictor: Predictor, redefined: Redefined | None) -> Belief:
@@ -390,23 +350,12 @@ def known_of(predictor: Predictor, redefined: Redefined | None) -> Belief:
     return replace(belief, mean=mean, begin=belief.start)
 
 
-def without_prior(belief: Belief, row: int) -> Belief:
-    """The belief with many more standard deviations of one coordinate, and bounds as much wider."""
-    unit = np.zeros(len(belief.mean))
-    unit[row] = _width(belief.coordinates[row])
-    covariance = np.linalg.inv(belief.root.T @ belief.root) + np.outer(unit, unit)
-    precision = np.linalg.inv(covariance)
-    root = np.linalg.cholesky(0.5 * (precision + precision.T)).T
-    coordinates = list(belief.coordinates)
-    low, high = _wider(coordinates[row])
-    coordinates[row] = replace(coordinates[row], low=low, high=high)
-    return replace(belief, coordinates=tuple(coordinates), root=root)
-
-
 def wrong_definition_words(wrong: Sequence[WrongDirection], machine: DiagnosedMachine, fit: Fit) -> str:
     """Where a definition is wrong, and by how much in a fit."""
     told = [f"{item.direction.key}: {_amount(item, machine, fit)}" for item in wrong]
-    return f"the definition is off at {', and at '.join(told)}"
+    instead = [rival.statement for item in wrong for rival in item.rivals]
+    beside = f"; nearly as well explained by {', or by '.join(instead)}" if instead else ""
+    return f"the definition is off at {', and at '.join(told)}{beside}"
 
 
 def _amount(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) -> str:

@@ -159,14 +159,21 @@ def wrong_definition_words(row: Mapping[str, Any]) -> str:
     >>> number = {"given": 3.0, "value": 5.1, "low": 4.7, "high": 5.5, "unit": "mm"}
     >>> wrong_definition_words({"key": "channel.depth", "defined": number})
     'The definition is off at channel.depth: 5.1 mm (4.7 to 5.5), where it says 3.'
+    >>> other = {"key": "coolant.film_factor", "given": 1.0, "value": 0.6, "unit": ""}
+    >>> wrong_definition_words({"key": "channel.depth", "defined": number, "rivals": [other]})[77:]
+    ' Nearly as well explained by coolant.film_factor (0.6 for 1).'
     """
     if "defined" not in row:
         return f"{misdescription_words(row)} The definition is off there ({row['key']})."
     number = row["defined"]
     given, middle, low, high = (significant(number[key]) for key in ("given", "value", "low", "high"))
+    instead = []
+    for item in row.get("rivals", ()):
+        value = f"{significant(item['value'])} {item['unit']}".strip()
+        instead.append(f"{item['key']} ({value} for {significant(item['given'])})")
     return (
         f"The definition is off at {row['key']}: {middle} {number['unit']} ({low} to {high}), "
-        f"where it says {given}."
+        f"where it says {given}." + (f" Nearly as well explained by {_or(instead)}." if instead else "")
     )
 
 
@@ -318,7 +325,8 @@ def checks(content: Mapping[str, Any]) -> list[str]:
     effects = catalogue()
     found: dict[str, None] = {}
     for row in wrong_rows(content):
-        found[f"Drawing, data sheet or machine: is {row['key']} as the definition has it?"] = None
+        for item in (row, *row.get("rivals", ())):
+            found[f"Drawing, data sheet or machine: is {item['key']} as the definition has it?"] = None
     sets = [content["findings"], *(item["findings"] for item in content["alternatives"])]
     for item in [finding for findings in sets for finding in findings]:
         text = item.get("check") or (effects[item["effect"]].check if item["effect"] in effects else "")

@@ -15,6 +15,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_PREFIX
+from spindle_fem.inference.freed_priors import WIDER
 from spindle_fem.inference.heat_misdescriptions import (
     Conductivity,
     Response,
@@ -35,13 +36,13 @@ from spindle_fem.inference.prepared_problem import EXPECTED_SLOW, calibrate
 from spindle_fem.inference.uncertain_numbers import uncertain_numbers
 from spindle_fem.inference.verdict import PRIOR_SIGMAS, Judgement
 from spindle_fem.inference.wrong_definition import (
-    WIDER,
     is_beyond_prior,
     number_beyond_prior,
     numbers_far_off,
     suspected_direction,
     suspected_of_calibration,
     with_wrong_definition,
+    wrong_definition_words,
     wrong_direction,
 )
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
@@ -324,6 +325,21 @@ def test_a_direction_is_suspected_where_it_explains_more_than_any_set(case, off_
         assert found.direction.name == "F1"
         assert found.value == pytest.approx(0.55, abs=0.1)
         assert found.is_beyond_chance
+
+
+def test_numbers_that_explain_a_calibration_as_well_are_told_beside_the_likeliest(case, off_at):
+    problem, null = off_at(1.6)
+    machine = SimpleNamespace(spec=case.fast.spec, redefined=None, given=case.fast.spec)
+    one, other = problem.predictor.misdescribed
+    heat = Number(FRONT[:1], *ALWAYS)
+    single, common = (replace(other, change=heat), replace(other, change=heat, stands_for=3))
+    first = suspected_of_calibration(problem, null, (one, single, common), machine)
+    assert first.direction is single
+    assert [rival.direction for rival in first.rivals] == [common]
+    assert "nearly as well explained by heat.table, " in wrong_definition_words([first], machine, null)
+    # what is twenty times less likely is no rival
+    many = replace(common, stands_for=30)
+    assert suspected_of_calibration(problem, null, (one, single, many), machine).rivals == ()
 
 
 @pytest.mark.parametrize(("factor", "told"), [(2.2, True), (1.25, False)])

@@ -12,6 +12,7 @@ from spindle_fem.effects.framework.effect import Reported
 from spindle_fem.errors import SpecError
 from spindle_fem.inference import redefined_machine, wrong_definition
 from spindle_fem.inference.belief import THETA_BOUND, Belief, Coordinate
+from spindle_fem.inference.freed_priors import TIMES_OFF, WIDER, without_prior
 from spindle_fem.inference.heat_misdescriptions import Conductivity, SpeedShape, with_material
 from spindle_fem.inference.misdescription import Misdescription
 from spindle_fem.inference.opened_machine import DiagnosedMachine
@@ -20,15 +21,12 @@ from spindle_fem.inference.structural_misdescriptions import MaterialCapacity, S
 from spindle_fem.inference.uncertain_numbers import uncertain_numbers
 from spindle_fem.inference.verdict import Judgement
 from spindle_fem.inference.wrong_definition import (
-    TIMES_OFF,
-    WIDER,
     Redefined,
     WrongDirection,
     defined_number,
     departure,
     is_beyond_prior,
     known_of,
-    without_prior,
 )
 
 CONDUCTS = Misdescription("iron", "key", "", 0.05, "", Conductivity("cast_iron"))
@@ -134,7 +132,8 @@ def test_a_number_of_a_definition_is_changed_to_what_a_direction_says(spec):
 def test_how_far_a_machine_is_from_its_definition_counts_from_the_given_one(spec):
     given = conducting(spec, 20.0)
     machine = replace(opened(conducting(spec, 40.0)), redefined=Redefined(given, ()))
-    assert departure(CONDUCTS, machine, np.log(1.25)) == pytest.approx(1.5)
+    assert departure(CONDUCTS, machine, np.log(1.25)) == pytest.approx(np.log(2.5))
+    assert CONDUCTS.told(np.log(2.5)) == pytest.approx(1.5)
     deeper = replace(opened(DEEPER.change.redefined(spec, 3.0)), redefined=Redefined(spec, ()))
     assert departure(DEEPER, deeper, -0.5) == pytest.approx(2.5)
 
@@ -176,7 +175,11 @@ def test_what_was_put_right_stays_open_as_widely_as_a_wrong_definition(spec, mon
     monkeypatch.setattr(wrong_definition, "known_before", lambda predictor: belief)
     assert known_of(None, None) is belief
     for row, (item, value, mean) in enumerate(
-        ((MOUNT, np.log(0.1), np.log(10.0) / 0.5), (share, 0.0, 0.0), (CONDUCTS, np.log(2.0), -0.5 / 0.05))
+        (
+            (MOUNT, np.log(0.1), np.log(10.0) / 0.5),
+            (share, 0.0, 0.0),
+            (CONDUCTS, np.log(2.0), -np.log(2.0) / 0.05),
+        )
     ):
         tried = SimpleNamespace(fast=SimpleNamespace(spec=item.change.redefined(spec, value)))
         opened = known_of(tried, Redefined(spec, (suspected(item, 0.9),)))
