@@ -20,7 +20,9 @@ from .draw import EVERY_EFFECT
 MACHINE = "recorded_spindle"
 
 
-def diagnose_case(inputs: Path, result: Path, machine: str, overrides: tuple[str, ...], report: bool) -> str:
+def diagnose_case(
+    inputs: Path, result: Path, machine: str, overrides: tuple[str, ...], full_model: str, report: bool
+) -> str:
     """Diagnose one case, in this process; return the verdict or the error."""
     from spindle_fem.commands.diagnose_command import diagnose, diagnose_without_report
 
@@ -37,7 +39,7 @@ def diagnose_case(inputs: Path, result: Path, machine: str, overrides: tuple[str
             result,
             calibrate=[calibration] if calibration.exists() else [],
             overrides=overrides,
-            full_model="off",
+            full_model=full_model,
         )
     except Exception as error:  # noqa: BLE001 - a study goes on and counts its failures
         text = {"error": type(error).__name__, "message": str(error), "trace": traceback.format_exc()}
@@ -86,6 +88,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--mesh", default="coarse", choices=["coarse", "normal", "fine"])
     parser.add_argument("--machine", default=MACHINE)
+    parser.add_argument("--full-model", default="auto", choices=["auto", "off", "coarse", "own"])
     parser.add_argument("--report", action="store_true", help="pictures and reports too")
     parser.add_argument("--case", action="append", help="only this case; may be repeated")
     given = parser.parse_args(arguments)
@@ -100,10 +103,11 @@ def main(arguments: list[str] | None = None) -> None:
         return
     given.results.mkdir(parents=True, exist_ok=True)
     about = {"schema": "spindle-fem/study-run/1", "commit": commit(), "mesh": given.mesh}
+    about["full_model"] = given.full_model
     (given.results / "run.json").write_text(json.dumps(about), encoding="utf-8")
     # The first case alone: it builds the fast model that all others then read from the cache.
     first, *rest = names
-    common = (given.machine, overrides, given.report)
+    common = (given.machine, overrides, given.full_model, given.report)
     print(first, diagnose_case(inputs / first, given.results / first, *common), flush=True)
     with ProcessPoolExecutor(given.jobs) as pool:
         running = {pool.submit(diagnose_case, inputs / n, given.results / n, *common): n for n in rest}
