@@ -137,28 +137,23 @@ def departure(item: Misdescription, machine: DiagnosedMachine, value: float) -> 
 
 
 def wrong_direction(
-    problem: Problem, null: Fit, directions: Sequence[Misdescription], trials: int, coarseness: float = 1.0
+    freed: Freed, problem: Problem, null: Fit, trials: int, coarseness: float = 1.0
 ) -> WrongDirection | None:
     """The direction whose prior had best be given up; None where there are no directions.
 
     An offset of the prior's mean in one direction, itself normal and many times as wide, lowers the cost of
-    a fit with nothing missing, to first order in the coordinates and between their bounds. Its complexity is
-    that of ``h``, what is left of the prior's curvature there once everything else follows.
+    a fit. Its complexity is that of ``h``, what is left of the prior's curvature there once everything else
+    follows.
 
     Parameters
     ----------
+    freed : Freed
+        About that fit.
     null : Fit
-        With nothing missing, of that problem.
+        With nothing missing or beside effects, of that problem.
     trials : int
         Candidates that might explain the recording instead: each as likely beforehand as one direction.
     """
-    return _likeliest(Freed.of(problem, null, directions), problem, null, trials, coarseness)
-
-
-def _likeliest(
-    freed: Freed, problem: Problem, null: Fit, trials: int, coarseness: float = 1.0
-) -> WrongDirection | None:
-    """As :func:`wrong_direction`, of directions whose fits are known."""
     if not freed.items:
         return None
     gains = _gains(freed, problem, null, trials, coarseness)
@@ -273,10 +268,12 @@ def suspected_direction(
             likeliest[size] = score, item.fit
     for size, (score, fit) in likeliest.items():
         freed = Freed.of(problem, fit, directions)
-        wrong = _likeliest(freed, problem, fit, trials, coarseness)
+        wrong = wrong_direction(freed, problem, fit, trials, coarseness)
         if wrong is None or score + wrong.log_gain <= most:
             continue
-        wrong = _likeliest(freed.fitted(problem, fit), problem, fit, trials, coarseness)
+        wrong = wrong_direction(freed.fitted(problem, fit), problem, fit, trials, coarseness)
+        if score + wrong.log_gain <= most:
+            continue
         if size and not (wrong.is_beyond_chance and defined_number(wrong.direction, spec) is not None):
             continue
         most, found = score + wrong.log_gain, wrong
@@ -298,10 +295,10 @@ def suspected_of_calibration(
     # What is held at its bound would go further: first order undervalues it, and others stand in for it.
     held = [item for item in told if _is_held(problem, fit, item)]
     freed = Freed.of(problem, fit, every).fitted(problem, fit)
-    wrong = _likeliest(freed.only(held) if held else freed, problem, fit, 0)
+    wrong = wrong_direction(freed.only(held) if held else freed, problem, fit, 0)
     if wrong is not None and wrong.direction in told:
         # One of those that may be told: the others count for nothing.
-        wrong = _likeliest(freed.only(held or told), problem, fit, 0)
+        wrong = wrong_direction(freed.only(held or told), problem, fit, 0)
     if wrong is None or wrong.direction not in told or not wrong.is_beyond_chance:
         wrong = _farthest(freed.only(numbers), problem, fit)
     else:

@@ -15,7 +15,7 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.belief import Coordinate
 from spindle_fem.inference.candidate_response import BaseRun
 from spindle_fem.inference.coordinate_names import MISDESCRIBED_PREFIX
-from spindle_fem.inference.freed_priors import WIDER
+from spindle_fem.inference.freed_priors import WIDER, Freed
 from spindle_fem.inference.heat_misdescriptions import (
     Conductivity,
     Response,
@@ -271,12 +271,12 @@ def off_at(case, predictor):
 
 def test_a_definition_far_off_in_one_direction_is_found_there(off_at):
     problem, null = off_at(1.6)
-    wrong = wrong_direction(problem, null, problem.predictor.misdescribed, 100)
+    wrong = wrong_direction(Freed.of(problem, null, problem.predictor.misdescribed), problem, null, 100)
     assert wrong.direction.name == "F1"
     assert wrong.log_gain > 0.0
     # were it a sensor that differs, the definition would be right in it
     sensors = [replace(item, of_sensor=item.name == "F1") for item in problem.predictor.misdescribed]
-    assert wrong_direction(problem, null, sensors, 100).direction.name == "R1"
+    assert wrong_direction(Freed.of(problem, null, sensors), problem, null, 100).direction.name == "R1"
     refitted = Problem(problem.predictor, wrong.belief, EXPECTED_SLOW, problem.observations).fit()
     low, high = refitted.interval(wrong.direction.coordinate, 2.0)
     assert low < 0.6 < high
@@ -392,7 +392,7 @@ def counted(problem, null, refitted, wrong, trials=100):
 
 def test_a_definition_within_its_prior_is_not_wrong(off_at):
     problem, null = off_at(1.02)
-    wrong = wrong_direction(problem, null, problem.predictor.misdescribed, 100)
+    wrong = wrong_direction(Freed.of(problem, null, problem.predictor.misdescribed), problem, null, 100)
     assert wrong.log_gain < 0.0
     assert not wrong.is_beyond_chance
     assert not is_beyond_prior(wrong, GIVEN, null)
@@ -428,7 +428,7 @@ def test_slopes_of_directions_are_those_of_a_prediction(off_at):
 def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
     problem, null = off_at(1.6)
     directions = problem.predictor.misdescribed
-    wrong = wrong_direction(problem, null, directions, 100)
+    wrong = wrong_direction(Freed.of(problem, null, directions), problem, null, 100)
     fit = Problem(problem.predictor, wrong.belief, EXPECTED_SLOW, problem.observations).fit()
     nothing = Ranked(Hypothesis(fit, 0.0), 1.0)
     verdict = Judgement("parameter", 0.001, nothing, (), 0.0, "")
