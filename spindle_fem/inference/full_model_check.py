@@ -311,7 +311,7 @@ def _both_fits(
     least_share = LINEAR_SHARE if prepared.spec.mesh.order == 1 else 0.0
     meshed = {name: full.predicted for name, full in runs.items()}
     left = left_by_both(predictor, reduced, meshed, least_share)
-    if not same and confirmed_share(*left) < CONFIRMED:
+    if diagnosis.stated_fit.candidates and confirmed_share(*left) < CONFIRMED:
         # Both fits read alike by other parameters: a mesh may be apart from the fast model by more of one of
         # them. Of the machine with the set it is asked what the set alone changes.
         fit = diagnosis.stated_fit.without_candidates

@@ -14,7 +14,7 @@ from spindle_fem.errors import SpindleFemError
 from spindle_fem.inference import tuned
 from spindle_fem.inference.diagnosis import Diagnosis
 from spindle_fem.inference.hypothesis_fit import Fit
-from spindle_fem.inference.misdescription import Misdescription
+from spindle_fem.inference.misdescription import Factored, Misdescription
 from spindle_fem.inference.opened_machine import DiagnosedMachine, with_definition
 from spindle_fem.inference.set_odds import log_odds
 from spindle_fem.inference.wrong_definition import (
@@ -58,11 +58,12 @@ def with_definition_put_right(
     """
     opened, found, told = machine, diagnosis, ()
     while found.suspected is not None and len(told) < MOST_NUMBERS:
-        other, again = _followed(machine.spec, opened, found, (*told, found.suspected), diagnosed, progress)
+        new = (found.suspected, *_of_its_material(found))
+        other, again = _followed(machine.spec, opened, found, told, new, diagnosed, progress)
         if other is opened:
             found = again
             break
-        told = (*told, found.suspected)
+        told = (*told, *new)
         opened, found = other, again
     # The first may have stood for one that was found after it.
     wrong = tuple(item for item in told if is_beyond_prior(item, opened, _telling(item, found)))
@@ -82,29 +83,44 @@ def with_definition_put_right(
     )
 
 
+def _of_its_material(found: Diagnosis) -> tuple[WrongDirection, ...]:
+    """Other numbers of the material one of whose numbers is suspected: another material has others."""
+    suspected, material = found.suspected, getattr(found.suspected.direction.change, "material", "")
+    return tuple(
+        replace(suspected, direction=item, value=0.0, rivals=())
+        for item in found.predictor.misdescribed
+        if material
+        and item.name != suspected.direction.name
+        and isinstance(item.change, Factored)
+        and item.change.material == material
+    )
+
+
 def _followed(
     given: MachineSpec,
     opened: DiagnosedMachine,
     found: Diagnosis,
-    wrong: tuple[WrongDirection, ...],
+    told: tuple[WrongDirection, ...],
+    new: tuple[WrongDirection, ...],
     diagnosed: Callable[[DiagnosedMachine], Diagnosis],
     progress: Callable[[str], None],
 ) -> tuple[DiagnosedMachine, Diagnosis]:
-    """The machine with the last of some wrong numbers followed too, and its diagnosis.
+    """The machine with new wrong numbers followed beside those that are told, and its diagnosis.
 
-    As they are where that number is not told, or no machine can be made with it.
+    As they are where the first new one is not told, or no machine can be made with it.
     """
-    last, before = wrong[-1], (opened, found)
-    values = [*(_fitted(_telling(item, found), item.direction)[0] for item in wrong[:-1]), last.value]
+    suspected, wrong, before = new[0], (*told, *new), (opened, found)
+    values = [_fitted(_telling(item, found), item.direction)[0] for item in told]
+    values += [item.value for item in new]
     for _ in range(MOST_TIMES):
         progress(f"definition put right: {', '.join(item.direction.key for item in wrong)}")
         try:
             other = replace(_made(opened, wrong, values, progress), redefined=Redefined(given, wrong))
             again = diagnosed(other)
         except SpindleFemError as error:
-            note = f"The machine could not be made anew with another {last.direction.key}: {error}"
+            note = f"The machine could not be made anew with another {suspected.direction.key}: {error}"
             return opened, replace(found, notes=(*found.notes, note))
-        if opened is before[0] and not _is_told(last, found, other, again):
+        if opened is before[0] and not _is_told(suspected, found, other, again):
             return before
         opened, found = other, again
         fitted = [_fitted(_telling(item, found), item.direction) for item in wrong]
