@@ -26,7 +26,7 @@ from spindle_fem.inference.mismatch_place import where_of
 from spindle_fem.inference.missing_heat import stretches
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.verdict import Judgement
-from spindle_fem.inference.wrong_definition import numbers_far_off
+from spindle_fem.inference.wrong_definition import numbers_far_off, stated_sigmas
 from spindle_fem.results.run_summary import package_versions
 from spindle_fem.units import NORMAL_90_PERCENT
 
@@ -145,7 +145,7 @@ def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     What was put right counts from the definition as given.
     """
     fit, rows = diagnosis.stated_fit, []
-    sigmas = fit.stated_sigmas
+    sigmas = stated_sigmas(fit, diagnosis.wrong)
     for coordinate in diagnosis.machine_coordinates:
         if coordinate.name.startswith((MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)):
             continue

@@ -13,7 +13,13 @@ from spindle_fem.inference.misdescription import EVERY_CHANNEL, Misdescription
 from spindle_fem.inference.opened_machine import DiagnosedMachine
 from spindle_fem.inference.predictor import Predictor
 from spindle_fem.inference.uncertain_numbers import UncertainNumber
-from spindle_fem.inference.wrong_definition import Rival, defined_number, departure
+from spindle_fem.inference.wrong_definition import (
+    Rival,
+    WrongDirection,
+    defined_number,
+    departure,
+    stated_sigmas,
+)
 from spindle_fem.units import NORMAL_90_PERCENT
 
 # Directions that are listed: those moved by this many standard deviations of their priors, so many at most.
@@ -42,7 +48,7 @@ def misdescription_content(diagnosis: Diagnosis, machine: DiagnosedMachine) -> d
     final, null = (diagnosis.predictor, diagnosis.stated_fit), (diagnosis.unchanged, diagnosis.null)
     found = bool(diagnosis.final.candidates)
     wrong = [
-        _wrong_row(*final, item.direction, machine) | {"rivals": [_rival_row(each) for each in item.rivals]}
+        _wrong_row(*final, item, machine) | {"rivals": [_rival_row(each) for each in item.rivals]}
         for item in diagnosis.wrong
     ]
     wrong.sort(key=lambda row: -abs(row["sigmas"]))
@@ -64,21 +70,23 @@ def _rows(predictor: Predictor, fit: Fit, wrong: Sequence[dict[str, Any]] = ()) 
 
 
 def _wrong_row(
-    predictor: Predictor, fit: Fit, item: Misdescription, machine: DiagnosedMachine
+    predictor: Predictor, fit: Fit, wrong: WrongDirection, machine: DiagnosedMachine
 ) -> dict[str, Any]:
     """The row of the direction in which the definition is wrong, about the definition that was given."""
-    row = _row(predictor, fit, item, fit.stated_sigmas)
+    item = wrong.direction
+    row = _row(predictor, fit, item, stated_sigmas(fit, [wrong]))
+    before = defined_number(item, machine.given)
+    if before is None:
+        return row
     fitted = {key: row[key] for key in ("value", "low", "high")}
     beyond = {key: departure(item, machine, value) for key, value in fitted.items()}
     for key in ("largest_K", "largest_um"):
         if key in row and fitted["value"]:
             row[key] *= abs(beyond["value"] / fitted["value"])
     row |= {key: item.told(value) for key, value in beyond.items()} | {"sigmas": beyond["value"] / item.sigma}
-    before = defined_number(item, machine.given)
-    if before is not None:
-        row["defined"] = {"given": before.value, "unit": before.unit}
-        for key, value in fitted.items():
-            row["defined"][key] = defined_number(item, machine.spec, value).value
+    row["defined"] = {"given": before.value, "unit": before.unit}
+    for key, value in fitted.items():
+        row["defined"][key] = defined_number(item, machine.spec, value).value
     return row
 
 

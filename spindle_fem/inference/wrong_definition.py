@@ -365,6 +365,13 @@ def _amount(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) -> str:
     return f"it says {quantity(before)}, the {told_by} {quantity(after)}"
 
 
+def stated_sigmas(fit: Fit, wrong: Sequence[WrongDirection]) -> Array:
+    """:attr:`Fit.stated_sigmas` of a machine's fit, of numbers in which its definition is wrong wider."""
+    names = {item.direction.coordinate for item in wrong}
+    wider = [tuned.WRONG_WIDENING if c.name in names else 1.0 for c in fit.coordinates]
+    return wider * fit.stated_sigmas
+
+
 def with_wrong_definition(
     judgement: Judgement, wrong: Sequence[WrongDirection], machine: DiagnosedMachine
 ) -> Judgement:

@@ -16,6 +16,7 @@ from spindle_fem.inference.like_sets import are_alike
 from spindle_fem.inference.mismatch_place import component_shares
 from spindle_fem.inference.next_measurement import hypothesis_words
 from spindle_fem.inference.set_odds import rank
+from spindle_fem.inference.wrong_definition import stated_sigmas
 from spindle_fem.recordings.align import Recording
 from spindle_fem.recordings.conditions import operating_conditions
 from spindle_fem.units import MICROMETRES, ZERO_CELSIUS_K
@@ -287,7 +288,7 @@ def _parameters(diagnosis: Diagnosis) -> dict[str, Any]:
     known = np.linalg.inv(belief.root.T @ belief.root) if own else np.zeros((0, 0))
     fit = diagnosis.stated_fit
     rows = [_index(fit, item) for item in own]
-    spread = fit.stated_sigmas
+    spread = stated_sigmas(fit, diagnosis.wrong)
     sigmas = {"units": "1", "long_name": "in prior standard deviations from nominal"}
     # What was put right counts from the definition as it was given.
     off = np.array([diagnosis.put_right.get(item.name, 0.0) for item in own])

@@ -48,6 +48,7 @@ from spindle_fem.inference.wrong_definition import (
 from spindle_fem.model.reduced.spindle_inputs import fast_spindle
 from spindle_fem.report.diagnosis_tables import misdescription_blocks
 from spindle_fem.report.diagnosis_words import checks, verdict_sentence
+from spindle_fem.units import NORMAL_90_PERCENT
 from tests.support.diagnosed_spindle import TIMES, Case, written
 from tests.support.lumped_spindle import lumped_model
 
@@ -448,6 +449,9 @@ def test_a_wrong_definition_is_told_with_key_value_and_interval(off_at):
     told = content["wrong"]
     assert told["key"] == content["measure"]["key"] == "heat.table"
     assert told["low"] < 0.6 < told["high"]
+    # a number without a prior is where the model's other faults send it
+    low, _ = fit.interval(wrong.direction.coordinate, NORMAL_90_PERCENT, fit.stated_sigmas)
+    assert told["value"] - told["low"] == pytest.approx(tuned.WRONG_WIDENING * (told["value"] - low))
     assert told["largest_K"] > 1.0
     assert told["channel"] == "SP01"
     assert content["instead"] == []
