@@ -57,8 +57,10 @@ def with_definition_put_right(
         ``unchanged``, ``null`` and ``explanations`` are those of the definition as it was given.
     """
     opened, found, told = machine, diagnosis, ()
-    while found.suspected is not None and len(told) < MOST_NUMBERS:
+    while found.suspected is not None:
         new = (found.suspected, *_of_its_material(found))
+        if len(told) + len(new) > MOST_NUMBERS:
+            break
         other, again = _followed(machine.spec, opened, found, told, new, diagnosed, progress)
         if other is opened:
             found = again

@@ -50,12 +50,16 @@ def opened(spec):
     return DiagnosedMachine("one", spec, None, None, None, (), ())
 
 
-def fit_of(item, value, width=0.02):
+def fit_at(values, width=0.02):
     return SimpleNamespace(
-        values={item.coordinate: value},
+        values=values,
         stated_sigmas=None,
-        interval=lambda name, times, sigmas: (value - times * width, value + times * width),
+        interval=lambda name, times, sigmas: (values[name] - times * width, values[name] + times * width),
     )
+
+
+def fit_of(item, value, width=0.02):
+    return fit_at({item.coordinate: value}, width)
 
 
 class Found(SimpleNamespace):
@@ -236,13 +240,7 @@ def test_another_material_has_another_heat_capacity_too(spec, machines_made, cap
             # as long as its prior holds the capacity the conductivity stands for it
             off, short = off + 0.3 * short, 0.0
         values = {CONDUCTS.coordinate: off, holds.coordinate: short}
-        fit = SimpleNamespace(
-            values=values,
-            stated_sigmas=None,
-            interval=lambda name, times, sigmas: tuple(
-                values[name] + sign * times * 0.02 for sign in (-1.0, 1.0)
-            ),
-        )
+        fit = fit_at(values)
         found = (diagnosis_of if machine is given else settled)(CONDUCTS, off, by_calibration=True)
         found.final, found.calibrated = fit, SimpleNamespace(fit=fit)
         found.judgement = replace_chosen(found.judgement, fit)
@@ -271,13 +269,7 @@ def test_a_second_number_is_followed_beside_the_first(spec, machines_made):
         # until the mount is followed the conductivity goes too far
         off += 0.1 * np.log(short) if len(known) < 2 else 0.0
         values = {CONDUCTS.coordinate: off, MOUNT.coordinate: short}
-        fit = SimpleNamespace(
-            values=values,
-            stated_sigmas=None,
-            interval=lambda name, times, sigmas: tuple(
-                values[name] + sign * times * 0.02 for sign in (-1.0, 1.0)
-            ),
-        )
+        fit = fit_at(values)
         found = (settled if len(known) == 2 else diagnosis_of)(CONDUCTS, off, by_calibration=True)
         found.final, found.calibrated = fit, SimpleNamespace(fit=fit)
         found.judgement = replace_chosen(found.judgement, fit)
