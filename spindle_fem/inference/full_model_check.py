@@ -204,8 +204,9 @@ def full_model_errors(
         ``mesh`` (as requested or chosen), ``reason`` (why nothing was run, else
         None), and what was run: ``preset``, ``order``, ``unknowns``,
         ``step_error_K``, ``coupling_tolerance_K``, ``before`` and ``after`` (``train_rmse_K``,
-        ``heldout_rmse_K``, ``channels``, ``displacements``, ``steps``, ``seconds``), ``left`` (of
-        the readings over their errors: ``fast`` and ``full``, :func:`left_by_both`),
+        ``heldout_rmse_K``, ``channels``, ``displacements``, ``steps``, ``seconds``), ``left`` (by
+        a set of the readings over their errors: ``fast`` and ``full``, :func:`left_by_both`; None where
+        nothing was found),
         ``differences`` (largest difference of full and reduced model at each
         channel: ``before_K``, ``after_K`` and, of what the fits differ by,
         ``change_K``), ``displacement_differences`` (the same in ``_um``, but for
@@ -308,18 +309,19 @@ def _both_fits(
         reduced[name] = predictions_at_stamps(predictor, fit)
         apart[name] = [a - b for a, b in zip(full.predicted, reduced[name], strict=True)]
     predictor = diagnosis.predictor
-    least_share = LINEAR_SHARE if prepared.spec.mesh.order == 1 else 0.0
-    meshed = {name: full.predicted for name, full in runs.items()}
-    left = left_by_both(predictor, reduced, meshed, least_share)
-    if diagnosis.stated_fit.candidates and confirmed_share(*left) < CONFIRMED:
-        # Both fits read alike by other parameters: a mesh may be apart from the fast model by more of one of
-        # them. Of the machine with the set it is asked what the set alone changes.
-        fit = diagnosis.stated_fit.without_candidates
-        (bare,) = _runs(
-            {WITHOUT_SET: (predictor, fit)}, {WITHOUT_SET: begun[1]}, options, mesh, progress
-        ).values()
-        reduced["before"], meshed["before"] = predictions_at_stamps(predictor, fit), bare.predicted
+    left = None
+    if diagnosis.stated_fit.candidates:
+        least_share = LINEAR_SHARE if prepared.spec.mesh.order == 1 else 0.0
+        meshed = {name: full.predicted for name, full in runs.items()}
         left = left_by_both(predictor, reduced, meshed, least_share)
+        if confirmed_share(*left) < CONFIRMED:
+            # Both fits read alike by other parameters: a mesh may be apart from the fast model by more of one
+            # of them. Of the machine with the set it is asked what the set alone changes.
+            fit = diagnosis.stated_fit.without_candidates
+            bare = _runs({WITHOUT_SET: (predictor, fit)}, {WITHOUT_SET: begun[1]}, options, mesh, progress)
+            reduced["before"] = predictions_at_stamps(predictor, fit)
+            meshed["before"] = bare[WITHOUT_SET].predicted
+            left = left_by_both(predictor, reduced, meshed, least_share)
     supplied = any(n.startswith(FIRST_ORDER) for _, fit in fits.values() for n in fit.values)
     return {
         "mesh": mesh,
@@ -330,7 +332,7 @@ def _both_fits(
         "step_error_K": options.error,
         "coupling_tolerance_K": options.coupling_tolerance,
         **found,
-        "left": dict(zip(("fast", "full"), left, strict=True)),
+        "left": None if left is None else dict(zip(("fast", "full"), left, strict=True)),
         "differences": _differences(predictor, apart, "K"),
         "displacement_differences": _differences(predictor, apart, "um"),
         "first_order": FIRST_ORDER_NOTE if supplied else None,

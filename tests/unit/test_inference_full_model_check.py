@@ -203,6 +203,8 @@ def test_where_nothing_was_found_one_run_is_both(predictor, monkeypatch):
     other = full_model_errors(diagnosis_of(predictor, nothing, heat), machine)
     assert len(runs) == 3
     assert other["after"]["train_rmse_K"] != other["before"]["train_rmse_K"]
+    # no set leaves anything where none was found
+    assert same["left"] is other["left"] is None
 
 
 def test_a_balance_that_asks_for_a_better_fixed_point_gets_it(predictor, monkeypatch):
