@@ -386,11 +386,11 @@ def with_wrong_definition(
 
 
 def is_beyond_prior(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) -> bool:
-    """Whether the whole interval of a direction in a fit is where its prior hardly holds it."""
+    """Whether the whole interval of a direction, as it is stated, is where its prior hardly holds it."""
     item = wrong.direction
     values = (
         fit.values[item.coordinate],
-        *fit.interval(item.coordinate, NORMAL_90_PERCENT, fit.stated_sigmas),
+        *fit.interval(item.coordinate, NORMAL_90_PERCENT, stated_sigmas(fit, [wrong])),
     )
     far = [departure(item, machine, item.amount(value)) / item.sigma for value in values]
     within = min(np.abs(far)) <= PRIOR_SIGMAS or np.ptp(np.sign(far)) > 0.0

@@ -51,11 +51,15 @@ def opened(spec):
 
 
 def fit_at(values, width=0.02):
-    return SimpleNamespace(
-        values=values,
-        stated_sigmas=None,
-        interval=lambda name, times, sigmas: (values[name] - times * width, values[name] + times * width),
-    )
+    names = list(values)
+
+    def interval(name, times, sigmas):
+        half = times * width * sigmas[names.index(name)]
+        return values[name] - half, values[name] + half
+
+    coordinates = [SimpleNamespace(name=name) for name in names]
+    sigmas = np.ones(len(names))
+    return SimpleNamespace(values=values, coordinates=coordinates, stated_sigmas=sigmas, interval=interval)
 
 
 def fit_of(item, value, width=0.02):
@@ -143,6 +147,12 @@ def test_how_far_a_machine_is_from_its_definition_counts_from_the_given_one(spec
 
 
 MOUNT = next(i for i in uncertain_numbers(load_machine("recorded_spindle")) if i.name == "film.flange_back")
+
+
+def test_the_interval_that_is_stated_is_the_one_that_is_judged(spec):
+    machine = opened(spec)
+    for width, beyond in ((0.05, True), (0.07, False)):
+        assert is_beyond_prior(suspected(CONDUCTS, 0.3), machine, fit_of(CONDUCTS, 0.3, width)) == beyond
 
 
 def test_a_value_with_a_prior_is_a_number_of_the_definition_in_the_logarithm_of_its_factor(spec):
