@@ -87,15 +87,18 @@ def with_definition_put_right(
 
 def _of_its_material(found: Diagnosis) -> tuple[WrongDirection, ...]:
     """Other numbers of the material one of whose numbers is suspected: another material has others."""
-    suspected, material = found.suspected, getattr(found.suspected.direction.change, "material", "")
+    suspected = found.suspected
+    material = _material_of(suspected.direction)
     return tuple(
         replace(suspected, direction=item, value=0.0, rivals=())
         for item in found.predictor.misdescribed
-        if material
-        and item.name != suspected.direction.name
-        and isinstance(item.change, Factored)
-        and item.change.material == material
+        if material and _material_of(item) == material and item.name != suspected.direction.name
     )
+
+
+def _material_of(item: Misdescription) -> str:
+    """The material a number of which a direction is; empty where it is none."""
+    return getattr(item.change, "material", "") if isinstance(item.change, Factored) else ""
 
 
 def _followed(

@@ -161,7 +161,8 @@ def wrong_direction(
     level = float(chdtrc(1, freed.misfit[best] / (coarseness * tuned.CHANCE_DIVISOR)))
     item, value = freed.items[best], freed.items[best].sigma * float(freed.position[best])
     belief, p_value = without_prior(problem.belief, freed.rows[best]), _of_any(level, len(gains))
-    return WrongDirection(item, belief, value, float(gains[best]), _log_prior(freed, trials), p_value)
+    log_prior = float(_log_priors(freed, trials)[best])
+    return WrongDirection(item, belief, value, float(gains[best]), log_prior, p_value)
 
 
 def _gains(freed: Freed, problem: Problem, null: Fit, trials: int, coarseness: float = 1.0) -> Array:
@@ -170,14 +171,17 @@ def _gains(freed: Freed, problem: Problem, null: Fit, trials: int, coarseness: f
     precision = problem.belief.root.T @ problem.belief.root
     left = np.diag(precision - precision @ null.covariance[:size, :size] @ precision)[freed.rows]
     complexity = 0.5 * np.log1p(freed.widths**2 * np.maximum(left, 0.0))
-    # What stands for several values of a definition is off only where all of them are.
-    likely = _log_prior(freed, trials) - np.log([item.stands_for for item in freed.items])
-    return 0.5 * freed.misfit / (coarseness * tuned.GAIN_DIVISOR) - complexity + likely
+    counted = 0.5 * freed.misfit / (coarseness * tuned.GAIN_DIVISOR)
+    return counted - complexity + _log_priors(freed, trials)
 
 
-def _log_prior(freed: Freed, trials: int) -> float:
-    """Of one direction among all of them and all effects, over none."""
-    return float(np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(len(freed.items) + trials))
+def _log_priors(freed: Freed, trials: int) -> Array:
+    """Of each direction among all of them and all effects, over none.
+
+    What stands for several values of a definition is off only where all of them are.
+    """
+    one = np.log(tuned.NUMBER_PRIOR[1] / tuned.NUMBER_PRIOR[0]) - np.log(len(freed.items) + trials)
+    return one - np.log([item.stands_for for item in freed.items])
 
 
 def number_beyond_prior(
