@@ -88,8 +88,8 @@ class Diagnosis:
     wrong : tuple of WrongDirection
         Where the definition is wrong.
     put_right : mapping of str to float
-        How far the definition that was diagnosed is from the given one in each of those, in deviations of
-        its prior, by coordinate.
+        How far the definition that was diagnosed is from the given one in each number that was followed,
+        told wrong or not, in deviations of its prior, by coordinate.
     suspected : WrongDirection or None
         A number of it that is to be tried by making the machine anew.
     followed : Followed or None
@@ -115,6 +115,11 @@ class Diagnosis:
     suspected: WrongDirection | None = None
     followed: Followed | None = None
     notes: tuple[str, ...] = ()
+
+    @property
+    def without_prior(self) -> frozenset[str]:
+        """Coordinates of the machine whose prior is given up."""
+        return frozenset((*self.put_right, *(item.direction.coordinate for item in self.wrong)))
 
     @property
     def coarseness(self) -> float:

@@ -145,7 +145,7 @@ def _machine_parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     What was put right counts from the definition as given.
     """
     fit, rows = diagnosis.stated_fit, []
-    sigmas = stated_sigmas(fit, diagnosis.wrong)
+    sigmas = stated_sigmas(fit, diagnosis.without_prior)
     for coordinate in diagnosis.machine_coordinates:
         if coordinate.name.startswith((MISDESCRIBED_PREFIX, MISDESCRIBED_IN_PREFIX)):
             continue

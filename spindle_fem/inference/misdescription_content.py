@@ -52,9 +52,10 @@ def misdescription_content(diagnosis: Diagnosis, machine: DiagnosedMachine) -> d
         for item in diagnosis.wrong
     ]
     wrong.sort(key=lambda row: -abs(row["sigmas"]))
+    followed = () if machine.redefined is None else machine.redefined.wrong
     return {
         "directions": len(diagnosis.predictor.misdescribed),
-        "left_open": _rows(*final, wrong),
+        "left_open": _rows(*final, [*(_wrong_row(*final, item, machine) for item in followed), *wrong]),
         "instead": _rows(*null) if found else [],
         "measure": _to_measure(*(null if found else final), wrong),
         "wrong": wrong[0] if wrong else None,
@@ -72,9 +73,9 @@ def _rows(predictor: Predictor, fit: Fit, wrong: Sequence[dict[str, Any]] = ()) 
 def _wrong_row(
     predictor: Predictor, fit: Fit, wrong: WrongDirection, machine: DiagnosedMachine
 ) -> dict[str, Any]:
-    """The row of the direction in which the definition is wrong, about the definition that was given."""
+    """The row of a direction whose prior was given up, about the definition that was given."""
     item = wrong.direction
-    row = _row(predictor, fit, item, stated_sigmas(fit, [wrong]))
+    row = _row(predictor, fit, item, stated_sigmas(fit, {item.coordinate}))
     before = defined_number(item, machine.given)
     if before is None:
         return row

@@ -77,7 +77,7 @@ def with_definition_put_right(
         wrong=wrong,
         put_right={
             item.coordinate: departure(item, opened, 0.0) / item.sigma
-            for item in (each.direction for each in wrong)
+            for item in (each.direction for each in told)
         },
         unchanged=diagnosis.unchanged,
         null=diagnosis.null,

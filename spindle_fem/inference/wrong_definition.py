@@ -6,7 +6,7 @@ than any effect does, its prior is given up and everything is fitted again: what
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -369,10 +369,9 @@ def _amount(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) -> str:
     return f"it says {quantity(before)}, the {told_by} {quantity(after)}"
 
 
-def stated_sigmas(fit: Fit, wrong: Sequence[WrongDirection]) -> Array:
-    """:attr:`Fit.stated_sigmas` of a machine's fit, of numbers in which its definition is wrong wider."""
-    names = {item.direction.coordinate for item in wrong}
-    wider = [tuned.WRONG_WIDENING if c.name in names else 1.0 for c in fit.coordinates]
+def stated_sigmas(fit: Fit, without_prior: Collection[str]) -> Array:
+    """:attr:`Fit.stated_sigmas`, of coordinates whose prior is given up wider."""
+    wider = [tuned.WRONG_WIDENING if c.name in without_prior else 1.0 for c in fit.coordinates]
     return wider * fit.stated_sigmas
 
 
@@ -394,7 +393,7 @@ def is_beyond_prior(wrong: WrongDirection, machine: DiagnosedMachine, fit: Fit) 
     item = wrong.direction
     values = (
         fit.values[item.coordinate],
-        *fit.interval(item.coordinate, NORMAL_90_PERCENT, stated_sigmas(fit, [wrong])),
+        *fit.interval(item.coordinate, NORMAL_90_PERCENT, stated_sigmas(fit, {item.coordinate})),
     )
     far = [departure(item, machine, item.amount(value)) / item.sigma for value in values]
     within = min(np.abs(far)) <= PRIOR_SIGMAS or np.ptp(np.sign(far)) > 0.0

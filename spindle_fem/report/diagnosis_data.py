@@ -288,7 +288,7 @@ def _parameters(diagnosis: Diagnosis) -> dict[str, Any]:
     known = np.linalg.inv(belief.root.T @ belief.root) if own else np.zeros((0, 0))
     fit = diagnosis.stated_fit
     rows = [_index(fit, item) for item in own]
-    spread = stated_sigmas(fit, diagnosis.wrong)
+    spread = stated_sigmas(fit, diagnosis.without_prior)
     sigmas = {"units": "1", "long_name": "in prior standard deviations from nominal"}
     # What was put right counts from the definition as it was given.
     off = np.array([diagnosis.put_right.get(item.name, 0.0) for item in own])

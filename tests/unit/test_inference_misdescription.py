@@ -52,7 +52,7 @@ from spindle_fem.units import NORMAL_90_PERCENT
 from tests.support.diagnosed_spindle import TIMES, Case, written
 from tests.support.lumped_spindle import lumped_model
 
-GIVEN = SimpleNamespace(spec=None, given=None)  # no key of it is asked for
+GIVEN = SimpleNamespace(spec=None, given=None, redefined=None)  # no key of it is asked for
 FRONT = ("F1", "F2", "F3")
 SHAPE = "heat_shape.front.1"
 ALWAYS = (0.0, 1000.0), (1.0, 1.0)

@@ -260,6 +260,9 @@ def test_another_material_has_another_heat_capacity_too(spec, machines_made, cap
     machine, found = with_definition_put_right(given, seen(given), seen)
     assert [item.direction for item in machine.redefined.wrong] == [CONDUCTS, holds]
     assert [item.direction for item in found.wrong] == [CONDUCTS, holds][: 2 if capacity == 900.0 else 1]
+    # either counts from the definition as given, told or not
+    off = [np.log(TRUE / 150.0) / CONDUCTS.sigma, np.log(500.0 / capacity) / holds.sigma]
+    assert [found.put_right[item.coordinate] for item in (CONDUCTS, holds)] == pytest.approx(off, abs=1.0)
     own = machine.spec.materials["cast_iron"]
     assert own.thermal_conductivity == pytest.approx(TRUE, rel=0.05)
     assert own.specific_heat_capacity == pytest.approx(500.0, rel=0.05)
