@@ -16,7 +16,7 @@ BEFORE, AFTER = ([300.0 + size * TIMES[:, None]] for size in (8.0, 10.0))
 FAST = {"before": BEFORE, "after": AFTER}
 
 
-def left(full):
+def left(full, least_share=0.0):
     recording = SimpleNamespace(
         temperature_count=1,
         temperature=READ,
@@ -25,7 +25,7 @@ def left(full):
         noise=(SimpleNamespace(resolution=0.0),),
     )
     predictor = SimpleNamespace(recordings=(recording,), use=(np.ones(len(TIMES), dtype=bool),))
-    return left_by_both(predictor, FAST, full)
+    return left_by_both(predictor, FAST, full, least_share)
 
 
 def meshed(before, after):
@@ -54,6 +54,14 @@ def test_a_change_that_is_off_by_no_more_than_temperatures_are_says_nothing():
     """Both models are apart by a tenth of the rise with nothing missing, and of the change."""
     fast, full = left({"before": [BEFORE[0] + 0.8 * TIMES[:, None]], "after": [AFTER[0] + TIMES[:, None]]})
     assert max(fast, full) < 1.0
+
+
+def test_a_mesh_tells_a_change_no_better_than_its_elements_do():
+    """Temperatures agree with nothing missing, the change is 0.3 K too small of 2 K."""
+    short = {"before": BEFORE, "after": [AFTER[0] - 0.3 * TIMES[:, None]]}
+    (fast, told), (_, blamed) = left(short, 0.15), left(short)
+    assert fast < told < 1.05
+    assert blamed > 1.5 * told
 
 
 def test_a_set_that_does_on_the_mesh_what_nothing_missing_does_is_not_confirmed():
