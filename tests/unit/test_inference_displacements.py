@@ -257,7 +257,7 @@ def test_an_expansion_that_is_off_is_told_in_micrometres(heated):
         judgement=judgement,
         wrong=(),
     )
-    content = misdescription_content(made, SimpleNamespace())
+    content = misdescription_content(made, SimpleNamespace(redefined=None))
     (row,) = content["left_open"]
     assert (row["name"], row["channel"], row["largest_K"]) == ("expansion", "S1", 0.0)
     # Most of the growth is 3 µm/K of the shaft less 1.2 µm/K of the housing.
