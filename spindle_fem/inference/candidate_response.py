@@ -52,6 +52,12 @@ class Variant:
         """Amplitude at which its answer is taken: one unit of it."""
         return self.shape.get(self.candidate.amplitude, self.candidate.reference)
 
+    @property
+    def changes_the_machine(self) -> bool:
+        """Whether its answer is that of the machine changed so far, not to first order."""
+        steady = any(term.is_steady for term in self.candidate.terms)
+        return steady and self.candidate.amplitude in self.shape
+
     def values(self, amplitude: float) -> dict[str, float]:
         """Every parameter with the amplitude given."""
         values = {name: item.value for name, item in self.candidate.parameters.items()}
@@ -154,7 +160,9 @@ class BaseRun:
                 found[:, : len(self.columns), position] += self._reading(variant)
             if any(term.is_dynamic for term in candidate.terms):
                 dynamic.append(position)
-            if candidate.factors or any(term.is_steady for term in candidate.terms):
+            if variant.changes_the_machine:
+                found[:, :, position] += self._changed(variant)
+            elif candidate.factors or any(term.is_steady for term in candidate.terms):
                 steady.append(position)
         for first in range(0, len(dynamic), CHUNK):
             chosen = dynamic[first : first + CHUNK]
@@ -273,6 +281,13 @@ class BaseRun:
         predicted = self.predicted()
         shown = self.predictor.read(self.number, [variant.candidate], values, predicted, self._inlet)
         return shown - predicted
+
+    def _changed(self, variant: Variant) -> Array:
+        """Change of the channels where a coefficient is another from the start, (G + 1, c)."""
+        values = self.values | variant.values(variant.reference)
+        changed = self.predictor.predict(self.number, values, (*self.candidates, variant.candidate))
+        at_places = (changed.states - self.states) @ self.places.T
+        return np.concatenate((changed.temperature - self.predicted(), at_places), axis=1)
 
     def _steady(self, variants: Sequence[Variant]) -> Array:
         """Constant changes of the operators, by their derivatives where they do nothing."""

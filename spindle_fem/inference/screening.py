@@ -287,7 +287,7 @@ def amplitude_spread(variant: Variant) -> float:
     candidate = variant.candidate
     item = candidate.parameters[candidate.amplitude]
     if item.logarithmic:
-        return item.sigma / abs(float(np.log(variant.reference / candidate.null)))
+        return item.sigma / abs(_logarithm_of_reference(variant))
     return item.sigma / abs(variant.reference - candidate.null)
 
 
@@ -317,6 +317,8 @@ def _logarithm_of_reference(variant: Variant) -> float:
     candidate = variant.candidate
     if not candidate.parameters[candidate.amplitude].logarithmic:
         return 0.0
+    if variant.changes_the_machine:
+        return 1.0 - candidate.null / variant.reference
     return float(np.log(variant.reference / candidate.null))
 
 
