@@ -287,7 +287,7 @@ def amplitude_spread(variant: Variant) -> float:
     candidate = variant.candidate
     item = candidate.parameters[candidate.amplitude]
     if item.logarithmic:
-        return item.sigma / abs(_logarithm_of_reference(variant))
+        return item.sigma / abs(_size_of_reference(variant))
     return item.sigma / abs(variant.reference - candidate.null)
 
 
@@ -304,7 +304,7 @@ def spreads_at_size(variants: Sequence[Variant], gram: Array, data: Array) -> Ar
         Inner products as :class:`Screened` has them.
     """
     own = np.array([amplitude_spread(v) for v in variants])
-    unit = np.array([_logarithm_of_reference(v) for v in variants])
+    unit = np.array([_size_of_reference(v) for v in variants])
     spread = own
     for _ in range(SIZE_ROUNDS):
         size = np.abs(unit * data) / (np.diag(gram) + spread**-2.0)
@@ -312,8 +312,12 @@ def spreads_at_size(variants: Sequence[Variant], gram: Array, data: Array) -> Ar
     return spread
 
 
-def _logarithm_of_reference(variant: Variant) -> float:
-    """By which the logarithm of an amplitude changes with its reference; 0 of one without logarithm."""
+def _size_of_reference(variant: Variant) -> float:
+    """Size of a factor at its reference, by which :func:`spreads_at_size` counts; 0 of what is none.
+
+    Of an answer to first order its logarithm. What changes the machine itself is a conductance in a row with
+    others, and its size what that changes: its resistance.
+    """
     candidate = variant.candidate
     if not candidate.parameters[candidate.amplitude].logarithmic:
         return 0.0
@@ -348,20 +352,22 @@ def amplitude_to_begin_from(variant: Variant, scaled: float) -> float:
     A factor as far off as :func:`spreads_at_size` has it, and not farther than ``tuned.FARTHEST_START``: a
     conductance of nothing has no slope to return by.
     """
-    unit = _logarithm_of_reference(variant)
-    if unit:
-        most = tuned.FARTHEST_START * amplitude_spread(variant)
-        scaled = float(np.clip(_logarithm_at(variant, scaled) / unit, -most, most))
-    return amplitude_value(variant, scaled)
+    candidate = variant.candidate
+    item = candidate.parameters[candidate.amplitude]
+    if not item.logarithmic:
+        return amplitude_value(variant, scaled)
+    farthest = tuned.FARTHEST_START
+    value = candidate.null * np.exp(np.clip(_logarithm_at(variant, scaled), -farthest, farthest))
+    return float(np.clip(value, item.low, item.high))
 
 
 def is_far_off(variant: Variant, scaled: float) -> bool:
     """Whether an amplitude, in units of the reference, is a factor of which the first order says little."""
     item = variant.candidate.parameters[variant.candidate.amplitude]
-    return item.logarithmic and abs(_logarithm_at(variant, scaled)) > tuned.FACTOR_FAR_OFF * item.sigma
+    return item.logarithmic and abs(_logarithm_at(variant, scaled)) > tuned.FACTOR_FAR_OFF
 
 
 def _logarithm_at(variant: Variant, scaled: float) -> float:
     """Logarithm of a factor so many times as far off as its reference to first order."""
-    size = scaled * _logarithm_of_reference(variant)
+    size = scaled * _size_of_reference(variant)
     return float(np.copysign(np.log1p(abs(size)), size))

@@ -153,12 +153,11 @@ IMPROVEMENT_ROUNDS = 2
 # Shares of the amplitudes that a fit begins from, until it can be simulated: friction that feeds on its own
 # heat has no steady state at amplitudes that the linearised problem overestimates.
 START_SHARES = (1.0, 0.5, 0.2)
-# Standard deviations of its prior within which a factor's logarithm begins: at five, usual factors (0.5) are
-# twelve times what they were or a twelfth, those of hardly known conductances (1.7) a five-thousandth.
-FARTHEST_START = 5.0
-# Standard deviations from which the first order of a factor does not tell its forms at one place apart: seats
-# of the inner and the outer rings that conduct a twentieth.
-FACTOR_FAR_OFF = 2.0
+# Logarithm within which a fit of a factor begins: twenty times what it was, or a twentieth.
+FARTHEST_START = 3.0
+# Logarithm from which the first order of a factor does not tell its forms at one place apart: seats of the
+# inner and the outer rings that conduct a third.
+FACTOR_FAR_OFF = 1.2
 # An interval that lies in gaps of the recording by more than this share explains what nobody recorded.
 MOST_IN_GAPS = 0.5
 

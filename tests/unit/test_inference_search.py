@@ -33,6 +33,11 @@ TIMES = np.linspace(0.0, STOP, COUNT + 1)[:-1]
 READ = np.arange(0.0, STOP, 60.0)
 
 
+class Seats(Term):
+    def operating_factor(self, point, parameters):
+        return {}
+
+
 def candidate(effect, component="a", form="", **parameter):
     term = Term()
     term.name = f"{effect}.{component}.{form}"
@@ -177,8 +182,8 @@ def test_a_factor_begins_where_its_resistance_is_and_no_further_off_than_its_pri
     # Of a conductance the first order is one of its resistance.
     assert amplitude_to_begin_from(item, -1.5 / unit) == pytest.approx(1.0 / 2.5)
     assert amplitude_to_begin_from(item, 1.5 / unit) == pytest.approx(2.5)
-    farthest = tuned.FARTHEST_START * amplitude_spread(item)
-    assert amplitude_to_begin_from(item, -1e9) == pytest.approx(amplitude_value(item, -farthest))
+    assert amplitude_to_begin_from(item, -1e9 / unit) == pytest.approx(np.exp(-tuned.FARTHEST_START))
+    assert amplitude_to_begin_from(item, 1e9 / unit) == pytest.approx(np.exp(tuned.FARTHEST_START))
     assert amplitude_value(item, -5000.0) == 0.0  # where a logarithm would begin at minus infinity
     straight = Variant(candidate("x", logarithmic=False, value=0.0, low=-1e6, high=1e6), {})
     assert amplitude_to_begin_from(straight, 5000.0) == amplitude_value(straight, 5000.0)
@@ -193,9 +198,22 @@ def test_a_factor_pays_for_its_logarithm_however_far_off_it_is(true):
     (spread,) = spreads_at_size([item], gram, gram[0] * size / unit)
     deviations = abs(np.log(true)) / unit / own
     assert size / unit / spread == pytest.approx(deviations, rel=1e-3)
-    assert is_far_off(item, size / unit) == (deviations > tuned.FACTOR_FAR_OFF)
+    assert is_far_off(item, size / unit) == (abs(np.log(true)) > tuned.FACTOR_FAR_OFF)
     straight = Variant(candidate("x", logarithmic=False, value=0.0), {})
     assert spreads_at_size([straight], gram, gram[0]) == [amplitude_spread(straight)]
+
+
+def test_the_answer_of_a_lost_contact_is_worth_its_own_size():
+    """Once its answer is as far off as the machine was changed, by the prior and to begin from."""
+    usual = candidate("x", logarithmic=True, value=1.0, low=0.0, high=np.inf)
+    usual.terms[0].__class__ = Seats
+    lost = Variant(usual, {usual.amplitude: 0.1})
+    assert lost.changes_the_machine
+    assert amplitude_to_begin_from(lost, 1.0) == pytest.approx(0.1)
+    gram = np.array([[1e6]])
+    (spread,) = spreads_at_size([lost], gram, gram[0])
+    sigma = usual.parameters[usual.amplitude].sigma
+    assert 1.0 / spread == pytest.approx(-np.log(0.1) / sigma, rel=1e-3)
 
 
 # ------------------------------------------------------------------ missing heat

@@ -10,11 +10,12 @@ from spindle_fem.effects.framework.laws import factor
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Operating, Term
 
-# A seat of 20 µm clearance conducts through air a quarter of what an interference fit does, one of 50 µm a tenth.
+# A seat of 20 µm clearance conducts through air a quarter of what an interference fit does, one of 50 µm a
+# tenth.
 SIGMA = 1.2
 REFERENCE = 0.6
-# Factor at which the answer to a loose contact is also taken, from the machine changed so far: heat finds other
-# ways, so that to first order readings hardly answer to a contact that is lost.
+# Factor at which the answer to a lost contact is taken, from the machine changed so far: as heat finds other
+# ways, it is not many times that to a slightly worse contact.
 LOOSE = 0.1
 
 
