@@ -14,6 +14,9 @@ from spindle_fem.inference import tuned
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked
 from spindle_fem.inference.hypothesis_fit import Fit
 
+# Share of its usual size below which an effect is nothing.
+NOTHING = 1.0e-2
+
 
 def may_stand_for(fit: Fit, other: Fit, overlapping: Mapping[str, frozenset[str]]) -> bool:
     """Whether a set is an alternative explanation with as many effects as another.
@@ -140,16 +143,17 @@ def without_repeats(
     """Sets without those that say the same as another, which gets their probability.
 
     A gap that closes with temperature is, at some of its values, a contact that conducts less. Where both
-    read the same within a fifth of the noise, or the gap makes the readings no likelier, they say the same,
-    one of them with fewer values. Likewise heat without a name where a law of its place reads the same within
-    half the noise, and the readings say little between them.
+    read the same within a fifth of the noise, or the gap makes the readings no likelier, or it is never open,
+    they say the same, one of them with fewer values. Likewise heat without a name where a law of its place
+    reads the same within half the noise, and the readings say little between them.
     """
     left = {id(item): item.probability for item in ranked}
 
     def says_the_same(item: Ranked, other: Ranked) -> bool:
         told = told_by_readings(item.best, other.best, coarseness)
         if _repeats(item.fit, other.fit):
-            return told <= 0.0 or apart(item.fit, other.fit) < tuned.SAME_READINGS
+            is_plainer = told <= 0.0 or _is_null(item.fit, other.fit)
+            return is_plainer or apart(item.fit, other.fit) < tuned.SAME_READINGS
         return (
             leaves_unnamed(item.fit, other.fit, overlapping)
             and told < tuned.LEAST_HELDOUT_GAIN
@@ -181,6 +185,13 @@ def _repeats(fit: Fit, other: Fit) -> bool:
     own, theirs = fit.named_keys - other.named_keys, other.named_keys - fit.named_keys
     repeated = {(effect_of(effect).repeats, place) for effect, place, _ in own}
     return len(own) == len(theirs) == 1 and {(effect, place) for effect, place, _ in theirs} == repeated
+
+
+def _is_null(fit: Fit, other: Fit) -> bool:
+    """Whether the only effect that another set lacks has a size of nothing, whatever else its law changes."""
+    (law,) = (c for c in fit.named if c.key not in other.named_keys)
+    size = abs(fit.values[law.amplitude] - law.null) if law.amplitude in fit.values else np.inf
+    return size < NOTHING * abs(law.reference - law.null)
 
 
 def as_one(

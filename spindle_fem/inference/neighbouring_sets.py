@@ -76,8 +76,15 @@ def exchanged(search: Search) -> None:
                 tasks += _of_neighbours(search, hypothesis.fit, member, rest)
             else:
                 tasks += _in_place_of(search, hypothesis.fit, member, rest, reach)
-    search.fit_all(late, anew=True, reach=reach)
+    stuck = [] if is_network else [task for task in tasks if _has_pulled(search, task[0])]
+    search.fit_all([*late, *stuck], anew=True, reach=reach)
     search.fit_all(tasks, reach=reach)
+
+
+def _has_pulled(search: Search, candidates: tuple[Candidate, ...]) -> bool:
+    """Whether a set's fit ended with the machine pulled far off: about the best set it may end elsewhere."""
+    known = search.found.get(identity(candidates))
+    return known is not None and known.fit.misfit_with_prior - known.fit.misfit > tuned.PULLED
 
 
 def _in_place_of(

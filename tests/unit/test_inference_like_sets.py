@@ -226,6 +226,16 @@ def test_a_law_that_only_repeats_a_constant_one_at_its_place_is_no_rival(law, co
         assert {id(i.fit) for i in (apart.chosen, *apart.alternatives)} == {id(rich.fit), id(constant.fit)}
 
 
+@pytest.mark.parametrize(("size", "is_told"), [(0.0, False), (0.4, True)])
+def test_a_gap_that_is_never_open_is_a_contact_that_conducts_less(size, is_told):
+    """However much likelier its further values make the readings: they are not what its name says."""
+    plain = candidate("joint_conductance", "a|b", kind="parameter")
+    gap = hypothesis(candidate("gap_closure", "a|b"), misfit=350.0, position=(0.0, size))
+    constant = hypothesis(plain, misfit=400.0)
+    found = verdict(hypothesis(misfit=1400.0), gap, constant, calibrated=True)
+    assert found.chosen.fit is (gap.fit if is_told else constant.fit)
+
+
 @pytest.mark.parametrize(("coarseness", "fitted"), [(3.0, True), (1.0, False)])
 def test_what_leaves_least_of_a_network_is_fitted_to_the_end_though_others_are_likelier(coarseness, fitted):
     # Far enough apart that none reads as the first does.

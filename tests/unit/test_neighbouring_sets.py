@@ -64,6 +64,7 @@ class NotingSearch:
         )
         self.screenings = {identity(()): (nothing.fit, screened)}
         self.asked: set = set()
+        self.asked_anew: set = set()
 
     def ranked(self):
         """The best set first."""
@@ -104,7 +105,9 @@ class NotingSearch:
 
     def fit_all(self, tasks, anew=False, reach=0.0):
         """Note what is asked."""
-        self.asked |= {identity(candidates) for candidates, _ in tasks}
+        asked = {identity(candidates) for candidates, _ in tasks}
+        self.asked |= asked
+        self.asked_anew |= asked if anew else set()
 
 
 def test_other_forms_and_laws_at_its_place_are_tried_in_the_place_of_a_law_of_a_network():
@@ -135,6 +138,17 @@ def test_what_promises_to_do_the_same_is_tried_in_the_place_of_a_member_wherever
     search = NotingSearch((HUMP, RAMP, BESIDE, ELSEWHERE), (0.0, least - 1.0, least - 1.0, least + 1.0))
     exchanged(search)
     assert search.asked == {identity((ELSEWHERE,))}
+
+
+def test_a_set_whose_fit_had_pulled_the_machine_far_off_is_fitted_again_about_the_best_one():
+    """It ended where the machine takes up what another start shows it does."""
+    search = NotingSearch((HUMP, RAMP, BESIDE, ELSEWHERE), (0.0, 1.0, 2.0, 3.0))
+    for item, pulled in ((BESIDE, tuned.PULLED + 1.0), (ELSEWHERE, tuned.PULLED - 1.0)):
+        fit = SimpleNamespace(misfit=500.0, misfit_with_prior=500.0 + pulled)
+        search.found[identity((item,))] = SimpleNamespace(fit=fit)
+    exchanged(search)
+    assert search.asked_anew == {identity((BESIDE,))}
+    assert search.asked == {identity((item,)) for item in (RAMP, BESIDE, ELSEWHERE)}
 
 
 def test_all_that_a_sensor_may_do_and_a_few_others_are_tried_in_the_place_of_its_lie():
