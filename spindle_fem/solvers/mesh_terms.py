@@ -26,6 +26,7 @@ from spindle_fem.operation.effect_terms import (
     Derivatives,
     EffectTerms,
     Instants,
+    Quantities,
     multiplied,
     operating_factors,
     require_known,
@@ -39,6 +40,8 @@ Array = NDArray[np.float64]
 
 # A memory that has had so much time has reached where it goes, s.
 LONG = 1.0e9
+# A step this much shorter than a lag changes it as evenly as the step itself is.
+SHORT_STEPS = 1.0e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,7 +253,7 @@ class FieldTerms:
     def settled(self, point: OperatingPoint, temperature: Array, lumped: Array) -> Array:
         """Memory of terms that have long seen the same."""
         sensed = self._sensed(temperature, lumped)
-        return self._advanced(0.0, LONG, point.inputs, sensed, self._initial)
+        return self._advanced(0.0, LONG, point.inputs, sensed, self._initial).value[0]
 
     # --------------------------------------------------------------- details
     def _sensed(self, temperature: Array, lumped: Array) -> Array:
@@ -258,21 +261,29 @@ class FieldTerms:
         return self._sense @ np.concatenate((temperature, lumped))
 
     def _advanced(
-        self, time: float, step: float, inputs: Mapping[str, float], sensed: Array, memory: Array
-    ) -> Array:
+        self,
+        time: float,
+        step: float,
+        inputs: Mapping[str, float],
+        sensed: Array,
+        memory: Array,
+        derivatives: Derivatives = Derivatives.NONE,
+    ) -> Quantities:
         terms = self.terms
         read = sensed[None, : terms.n_sensed]
-        return terms.advance(Instants(time, inputs), step, read, memory[None], Derivatives.NONE).value[0]
+        return terms.advance(Instants(time, inputs), step, read, memory[None], derivatives)
 
     def _memory(self, time: float, sensed: Array, inputs: Mapping[str, float]) -> Array:
-        """Memory at a time of the step: the mean of what both ends would make of it."""
+        """Memory at a time of the step: between what both its ends would make of it."""
         begin = self._begin
         step = time - begin.time
         if not self._initial.size or step <= 0.0:
             return begin.memory
-        first = self._advanced(begin.time, step, begin.inputs, begin.sensed, begin.memory)
+        at_begin = begin.time, step, begin.inputs, begin.sensed, begin.memory
+        first = self._advanced(*at_begin, Derivatives.STATE)
         last = self._advanced(begin.time, step, inputs, sensed, begin.memory)
-        return 0.5 * (first + last)
+        weight = weight_of_end(np.diagonal(first.by_state[0]))
+        return first.value[0] + weight * (last.value[0] - first.value[0])
 
     def _change(
         self,
@@ -369,6 +380,28 @@ def steady_physics(machine: PreparedMachine, physics: Physics) -> Callable[..., 
         return terms.steady(point, temperature, np.array([lumped.get(name, mean) for name in names]))
 
     return beyond
+
+
+def weight_of_end(kept: Array) -> Array:
+    """Weight of a step's end in what a first-order lag makes of a quantity that changes evenly over it.
+
+    Parameters
+    ----------
+    kept : (n,) ndarray
+        Share of each memory that is left after the step, ``e^(-h/τ)``; of what is no lag 1.
+
+    Returns
+    -------
+    (n,) ndarray
+        ``1/(1 - kept) - τ/h``: a half of short steps, all of long ones.
+
+    >>> weight_of_end(np.exp(-np.array([1e-6, 1.0, 100.0]))).round(3).tolist()
+    [0.5, 0.582, 0.99]
+    """
+    steps = -np.log(np.clip(kept, np.finfo(float).tiny, 1.0))
+    is_short = steps < SHORT_STEPS
+    steps = np.where(is_short, 1.0, steps)
+    return np.where(is_short, 0.5, -1.0 / np.expm1(-steps) - 1.0 / steps)
 
 
 def settled_memory(

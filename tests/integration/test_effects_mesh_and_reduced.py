@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from spindle_fem.effects.catalogue.coolant_film import TransitionTerm
+from spindle_fem.effects.catalogue.heat_capacity import ContactCapacityTerm
 from spindle_fem.effects.catalogue.thermal_preload import PreloadMechanicsTerm, ThermalPreloadTerm
 from spindle_fem.effects.framework.laws import amplitude
 from spindle_fem.effects.framework.machine_view import ChannelFlow
@@ -191,6 +192,24 @@ def test_added_mass_adds_exactly_its_capacity(machine):
     assert root @ (storage @ root) == pytest.approx(ones @ (storage @ ones) + 5700.0, rel=1e-12)
     assert np.ptp(scale[inside]) == 0.0
     assert scale.min() >= 1.0
+
+
+def test_a_mass_behind_a_contact_is_right_in_steps_much_longer_than_its_lag(machine):
+    times = np.arange(0.0, 1.5 * HOUR, 60.0)
+    inputs = InputHistory(times, STANDARD, *inputs_over(times, speed=3000.0 * RPM, ambient=293.15))
+    mass = of_size(ContactCapacityTerm("mass", ("housing",), 1.0), 2.0e4, contact_time=120.0)
+
+    def delay(error):
+        options = TransientOptions(error=error, error_norm="mean")
+        without = simulate_full(machine, inputs, options=options)
+        run = simulate_full(machine, inputs, options=options, physics=mass)
+        return without.reading("SP01") - run.reading("SP01"), np.diff(run.steps.times).max()
+
+    expected, _ = delay(0.01)
+    found, longest = delay(0.2)
+    assert longest > 5.0 * 120.0
+    assert expected.max() > 0.2
+    assert np.abs(found - expected).max() < 0.2 * expected.max()
 
 
 def uniform_point(machine):
