@@ -482,22 +482,6 @@ def test_answers_are_differences_of_full_runs_at_small_amplitude(predictor, cand
         assert np.abs(answers[:, :, column] - difference).max() < 0.01 * size, candidate.label
 
 
-def test_a_contact_that_is_lost_answers_as_the_machine_without_it_does(predictor, view):
-    """Not as ten times what the first tenth of it does: heat that finds other ways changes little more."""
-    seats = next(c for c in effect_of("joint_conductance").candidates(view) if not c.factors)
-    first_order, lost = variants_of([seats])
-    assert lost.reference == 0.1
-    present = [c for c in candidates_for(view) if c.effect == "windage"][:1]
-    values = NOW | values_of(present[0])
-    base = BaseRun(predictor, 0, values, present)
-    answers = base.responses([first_order, lost])
-    told = predictor.predict(0, values | lost.values(0.1), (*present, seats)).temperature
-    difference = told - predictor.predict(0, values, present).temperature
-    assert answers[:, :, 1] == pytest.approx(difference, abs=1e-9)
-    extended = answers[:, :, 0] * (1.0 / 0.1 - 1.0) / -np.log(first_order.reference)
-    assert np.abs(extended - difference).max() > 0.2 * np.abs(difference).max()
-
-
 def test_answers_do_not_depend_on_their_company(predictor, candidates):
     variants = variants_of([candidates[key] for key in (("windage", ""), ("heat_scale", ""))])
     variants += variants_of([candidates["sensor_lag", ""], candidates["grease_churning", ""]])

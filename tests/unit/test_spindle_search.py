@@ -5,10 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from spindle_fem.effects.catalogue.joint_conductance import LOOSE as LOOSE_SEATS
 from spindle_fem.effects.catalogue.unrecorded_cooling import CLOSED
 from spindle_fem.effects.framework.unrecorded import followed_name
 from spindle_fem.effects.registry import candidates_for, catalogue, effect_of, interval_effects
 from spindle_fem.inference import neighbouring_sets, search_course, tuned
+from spindle_fem.inference.candidate_response import BaseRun, Variant, variants_of
 from spindle_fem.inference.final_fits import few_of_each
 from spindle_fem.inference.findings import findings_of
 from spindle_fem.inference.hypothesis import Hypothesis, Ranked, identity
@@ -37,6 +39,22 @@ def search_over(case, diagnosis, kind=Search):
     weights = dict.fromkeys(effects, 1.0)
     candidates = candidates_for(case.view)
     return kind(problem, case.view, effects, candidates, interval_effects(), weights, workers=Workers(1))
+
+
+def test_a_contact_that_is_lost_answers_as_the_machine_without_it_does(case, heated):
+    """Not as many times what a slightly worse one does: heat that finds other ways changes little more."""
+    seats = next(c for c in effect_of("joint_conductance").candidates(case.view) if not c.factors)
+    present = [effect_of("windage").candidates(case.view)[0]]
+    first_order, lost = variants_of([seats])
+    assert lost.reference == LOOSE_SEATS
+    predictor = heated.predictor
+    values = Variant(present[0], {}).values(present[0].reference)
+    answers = BaseRun(predictor, 0, values, present).responses([first_order, lost])
+    told = predictor.predict(0, values | lost.values(LOOSE_SEATS), (*present, seats)).temperature
+    difference = told - predictor.predict(0, values, present).temperature
+    assert answers[:, :, 1] == pytest.approx(difference, abs=1e-9)
+    extended = answers[:, :, 0] * (1.0 / LOOSE_SEATS - 1.0) / -np.log(first_order.reference)
+    assert np.abs(extended - difference).max() > 0.2 * np.abs(difference).max()
 
 
 def test_heat_found_at_a_wrong_spot_is_tried_at_the_right_one(case, heated):

@@ -289,18 +289,15 @@ def test_a_machine_as_sound_as_expected_raises_no_more_alarms_than_stated(folder
     days, alarms_a_day, slow = 4.0, 30.0, SlowError(0.2, 1500.0)
     monkeypatch.setattr(watch, "expected_slow_error", lambda predictor: slow)
     frame = heated(24.0 * days, seed=4)
-    kept = np.exp(-30.0 / slow.time)
-    fresh = slow.sigma * np.sqrt(1.0 - kept**2) * np.random.default_rng(5).standard_normal(len(frame))
-    frame["block"] += lfilter([1.0], [1.0, -kept], fresh)
+    kept, fresh = np.exp(-30.0 / slow.time), np.random.default_rng(5).standard_normal(len(frame))
+    frame["block"] += lfilter([slow.sigma * np.sqrt(1.0 - kept**2)], [1.0, -kept], fresh)
     write_recording(folder / "long", frame, TEMPERATURES, INPUTS)
-    alarms = alarms_a_day * 365.25 / 12.0
-    how = Watching(calibrate=(folder / "sound",), until_end=True, alarms=alarms)
+    how = Watching(calibrate=(folder / "sound",), until_end=True, alarms=alarms_a_day * 365.25 / 12.0)
     states = [line["state"] for line in watch_recording(folder / "machine.toml", folder / "long", how)]
     found = sum(
         now == "left" and before != "left" for before, now in zip(["", *states], states, strict=False)
     )
-    # Fewer, as Bonferroni has it: the sums of one channel find the same chance departures, and an alarm holds
-    # until the departure is over. (9 to 18 of 120 by seed, size and time of the slow error.)
+    # Fewer, as Bonferroni has it: sums of one channel find the same departures, and an alarm holds.
     assert 0.05 * alarms_a_day * days < found < alarms_a_day * days
 
 
