@@ -29,7 +29,9 @@ SPEED = RPM * np.where(TIMES < 1200.0, 3000.0, 1000.0)
 
 def at_speeds(speed):
     """What the fast model asks of a recording."""
-    return SimpleNamespace(source="speeds", input_names=("speed",), inputs=speed[:, None])
+    return SimpleNamespace(
+        source="speeds", input_names=("speed",), input_units=("rad/s",), inputs=speed[:, None]
+    )
 
 
 @pytest.fixture(scope="module")

@@ -156,7 +156,7 @@ def test_operators_in_proportion_are_differences_of_operators(model, small):
     point = OperatingPoint.of(small.spec)
     bridges = {"housing.outside": 1.5, "F1.outer_raceway": 0.7}
     plain = [name for name, change in model.changes.items() if not change.moves_channel]
-    assert len(plain) == 4
+    assert len(plain) == 5
     found = model.operators(point, {}, plain, conductances=bridges)
     storage = model.storage_by({}, plain)
     for name in plain:

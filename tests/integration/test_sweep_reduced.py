@@ -10,6 +10,7 @@ from spindle_fem.errors import FaultsError
 from spindle_fem.model.reduced.build_for_designs import FIRST_TABLES
 from spindle_fem.model.reduced.heat_tables import BearingTables
 from spindle_fem.model.thermal_model import ThermalModel
+from spindle_fem.results.output_folder import MARKER
 from spindle_fem.studies.sweep.designs import Design
 from spindle_fem.studies.sweep.evaluate_design import Question, TaskBuilder, row_of, solve_checked
 from spindle_fem.studies.sweep.fast_backend import (
@@ -216,6 +217,7 @@ def test_a_sweep_is_the_same_however_it_runs_and_resumes(tmp_path):
     stopped.mkdir()
     lines = whole.splitlines(keepends=True)
     (stopped / RESULTS).write_bytes(b"".join(lines[:12]))
+    (stopped / MARKER).write_text("stopped", encoding="utf-8")
     sweep_machine("recorded_spindle", path, stopped, QUICK)
     assert (stopped / RESULTS).read_bytes() == whole
 

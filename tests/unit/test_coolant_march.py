@@ -271,3 +271,20 @@ class TestDrivenChannel:
     def test_unknown_option(self):
         with pytest.raises(OutOfValidityError, match='Did you mean "inlet"'):
             self.march(properties_at="inlets")
+
+
+@pytest.mark.parametrize("properties_at", ["local", "inlet"])
+def test_the_bounds_of_a_march_are_those_of_a_settled_one(properties_at):
+    """A march leaves them out: who needs a band asks for it."""
+    choice = FilmChoice("helical", properties_at)
+    channel = DrivenChannel(CHANNEL, OIL, FLOW, INLET, [0.1562 / 20] * 20, choice)
+    wall = np.full(20, 295.0)
+    settled = channel.settle(wall)
+    plain = channel.settle(wall, bounds=False)
+    assert np.all(np.asarray(plain.film.low) == plain.film.value)
+    found = channel.with_bounds(wall, plain).film
+    for end in ("low", "value", "high"):
+        own, whole = (np.asarray(getattr(film, end)) for film in (found, settled.film))
+        assert own == pytest.approx(whole, rel=1e-3)
+    assert np.all(np.asarray(found.low) < found.value)
+    assert np.all(np.asarray(found.value) < found.high)

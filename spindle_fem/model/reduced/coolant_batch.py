@@ -87,6 +87,10 @@ class ChannelBatch:
         found = self.driven.march(wall, None if before is None else before.channel)
         return ChannelField(self.factor * np.broadcast_to(found.film.value, wall.shape), found)
 
+    def with_bounds(self, wall: Array, field: ChannelField) -> ChannelField:
+        """Films with their low and high ends, at wall temperatures (n, n_starts, n_along) K."""
+        return ChannelField(field.film, self.driven.with_bounds(wall, field.channel))
+
     def linear(self, state: ChannelField) -> tuple[Array, Array]:
         """Heat of the cells from wall temperatures: matrix (n, starts, cells, cells) and constant."""
         march, capacity_rate = state.march, state.channel.mass_flow * state.march.specific_heat_capacity

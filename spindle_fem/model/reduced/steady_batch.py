@@ -265,6 +265,8 @@ class _Run:
                 inverse = np.linalg.inv(matrix)
         quantities, film = self._follow(unknowns)
         moving = self._moving(quantities)
+        if self.channel is not None:
+            self.field = self.channel.with_bounds(self._wall(unknowns), self.field)
         coefficients = self.inputs.coefficients.copy()
         coefficients[:, self.solver.balls] = moving[:, : len(self.solver.balls)]
         batch = SteadyBatch(

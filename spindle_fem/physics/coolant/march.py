@@ -313,6 +313,18 @@ class DrivenChannel:
             return found
         return replace(found, march=_with_true_enthalpy(found.march, self.coolant, float(found.mass_flow)))
 
+    def with_bounds(self, wall: ArrayLike, found: ChannelMarch) -> ChannelMarch:
+        """A march with low and high of its film, which :meth:`march` leaves out.
+
+        Parameters
+        ----------
+        wall : (..., n) array_like, [K]
+            As for the march.
+        """
+        local = self.choice.properties_at == "local"
+        bulk = found.march.bulk_temperature if local else self.inlet_temperature
+        return replace(found, film=self._film(wall, bulk, bounds=True))
+
     def outlets(self, walls: ArrayLike) -> NDArray[np.float64]:
         """Mixed outlet temperature over many walls, (m,) [K], as :meth:`settle` has it for each.
 
