@@ -176,7 +176,7 @@ def test_amplitudes_go_back_to_values(logarithmic):
     assert amplitude_value(item, 100.0) == 3.0
 
 
-def test_a_factor_begins_where_its_resistance_is_and_no_further_off_than_its_prior_reaches():
+def test_a_factor_begins_where_its_resistance_is_and_no_further_off_than_a_twentieth():
     item = Variant(candidate("x", logarithmic=True, value=1.0, low=0.0, high=np.inf), {})
     unit = np.log(item.candidate.reference)
     # Of a conductance the first order is one of its resistance.

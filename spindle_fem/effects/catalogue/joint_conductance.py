@@ -10,8 +10,7 @@ from spindle_fem.effects.framework.laws import factor
 from spindle_fem.effects.framework.machine_view import MachineView
 from spindle_fem.effects.framework.term import Operating, Term
 
-# A seat of 20 µm clearance conducts through air a quarter of what an interference fit does, one of 50 µm a
-# tenth.
+# Of what a tight seat conducts, 5400 W/(m²·K), a gap of 20 µm of air has a quarter, one of 50 µm a tenth.
 SIGMA = 1.2
 REFERENCE = 0.6
 # Factor at which the answer to a lost contact is taken, from the machine changed so far: as heat finds other
